@@ -35,13 +35,15 @@ How peers differ: Auger and Hansen 2005 start every run with half of the width o
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from annotated_types import Ge
 from cmaes import CMA
 
 from algorithms.contract import Box, as_loss
 from algorithms.leaders import Leaders, leader, no_leaders, promote
+from algorithms.ranges import Positive
 from armlab.common.arrays import Array
 
 
@@ -63,7 +65,7 @@ class PicklableOptimiserState:
 class CMAESParams:
     """Initial step size as a fraction of the width of the box."""
 
-    first_step_size: float = 1.0 / math.sqrt(12.0)
+    first_step_size: Positive = 1.0 / math.sqrt(12.0)
 
 
 @dataclass
@@ -82,12 +84,11 @@ class CMAES:
 
     name = "cma-es"
     Params = CMAESParams
+    fewest = 2  # they are ranked against each other
 
     @staticmethod
     def init(params: CMAESParams, population: Array, box: Box, horizon: int, rng: np.random.Generator) -> CMAESState:
         n, d = population.shape
-        if n < 2:
-            raise ValueError(f"CMA-ES ranks points against each other: {n} is too few")
         seed = int(rng.integers(2**32))
         centre = np.full(d, 0.5)
         optimiser = CMA(centre, params.first_step_size, seed=seed, population_size=n)
@@ -127,8 +128,8 @@ MEAN_DECIMALS = 9
 class IPOPParams:
     """Step size of every start as a fraction of the width of the box; growth of the population at a restart."""
 
-    first_step_size: float = 0.3
-    growth: int = 2
+    first_step_size: Positive = 0.3
+    growth: Annotated[int, Ge(1)] = 2
 
 
 @dataclass

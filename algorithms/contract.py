@@ -37,7 +37,8 @@ class Box(NamedTuple):
 class Algorithm(Protocol[ParamsT, StateT]):
     """A metaheuristic: a class that holds functions, never data; everything that changes is in its State.
 
-    Params: a frozen dataclass of hyper-parameters, all with defaults.
+    Params: a frozen dataclass of hyper-parameters, all with defaults; a range stands in the type of a field,
+    `Annotated[float, Ge(0)]`. A class that needs more than one point says so in `fewest` (see `fewest_points`).
     A State can be pickled and resumed; `ask` and `tell` use up the State that they are given (it may be
     changed in place, as its random generator always is): go on with the one they return.
     """
@@ -81,6 +82,15 @@ class Algorithm(Protocol[ParamsT, StateT]):
 
 
 AnyAlgorithm: TypeAlias = type[Algorithm[Any, Any]]
+
+
+class BrokenContractError(ValueError):
+    """An algorithm broke its contract; the message says in one line what it did and what would be right."""
+
+
+def fewest_points(algorithm: AnyAlgorithm) -> int:
+    """Points that the first population must have at least: the class attribute `fewest`, 1 without one."""
+    return int(getattr(algorithm, "fewest", 1))
 
 
 @runtime_checkable

@@ -18,11 +18,14 @@ defaults to rand/1/exp; mealpy has F = 0.1 and no forced coordinate; pymoo adds 
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Interval
 from numpy.typing import NDArray
 
 from algorithms.contract import Box, as_loss
+from algorithms.ranges import Share
 from armlab.common.arrays import Array
 
 
@@ -30,8 +33,8 @@ from armlab.common.arrays import Array
 class DEParams:
     """Table 2."""
 
-    scaling_factor: float = 0.85
-    crossover_rate: float = 1.0
+    scaling_factor: Annotated[float, Interval(ge=0, le=2)] = 0.85  # the source's range
+    crossover_rate: Share = 1.0
 
 
 @dataclass
@@ -48,11 +51,10 @@ class DE:
 
     name = "de"
     Params = DEParams
+    fewest = 4  # a target and three others
 
     @staticmethod
     def init(params: DEParams, population: Array, box: Box, horizon: int, rng: np.random.Generator) -> DEState:
-        if len(population) < 4:
-            raise ValueError(f"DE takes a target and three others: {len(population)} points are too few")
         return DEState(params, population.copy(), np.full(len(population), np.inf), rng)
 
     @staticmethod

@@ -11,7 +11,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from algorithms.contract import AnyAlgorithm, AsksDerivatives, Box, as_loss, question_of
+from algorithms.contract import (
+    AnyAlgorithm,
+    AsksDerivatives,
+    Box,
+    BrokenContractError,
+    as_loss,
+    fewest_points,
+    question_of,
+)
 from armlab.common.arrays import Array
 from armlab.common.derivatives import Derivatives, Question
 
@@ -121,14 +129,17 @@ def minimise(
     objective: (n, d) -> (n,), smaller is better. evaluations: the budget, never exceeded.
     bounds: name of the policy in `algorithms.driver`. Points are never rescaled.
     source: of derivatives, for an algorithm that asks for them.
-    Raises ValueError for a budget below 1, an impossible box, or an objective that returns another shape.
+    Raises ValueError for a budget below 1, an impossible box, fewer points than the algorithm takes, or an objective
+    that returns another shape; BrokenContractError for an algorithm that asks for what is no point of the box's space.
     """
     _check_problem(box, population, evaluations)
+    if len(population) < fewest_points(algorithm):
+        raise ValueError(f"{algorithm.name} takes {fewest_points(algorithm)} points or more, not {len(population)}")
     horizon = planned_iterations(evaluations, len(population))
     state = algorithm.init(params, population, box, horizon, rng)
     batches = list(iterate(algorithm, state, objective, box, evaluations, bounds, source))
     if not batches:
-        raise ValueError(f"algorithm {algorithm.name!r} was finished before its first population")
+        raise BrokenContractError(f"algorithm {algorithm.name!r} was finished before its first population")
     return summarise_batches(batches)
 
 
@@ -147,12 +158,13 @@ def iterate(
     an algorithm is only told whole populations. So a run is resumed from the state after a whole batch. The
     state of a batch is used up when the next batch is taken: pickle it before, to keep it. A point with derivatives
     that costs more than what is left of the budget ends the run. Raises ValueError if an algorithm asks for
-    derivatives and there is no source.
+    derivatives and there is no source, BrokenContractError if it asks for what is no point.
     """
     into_box = bound_policy(bounds)
     walls = box
     while evaluations > 0 and not algorithm.finished(state):
-        asked, state = algorithm.ask(state)
+        points, state = algorithm.ask(state)
+        asked = _checked_points(algorithm, points, len(box.lower))
         question = question_of(algorithm, state)
         if question is not None and _price(algorithm, asked, source) > evaluations:
             return
@@ -174,8 +186,25 @@ def _price(algorithm: AnyAlgorithm, asked: Array, source: DerivativeSource | Non
     if source is None:
         raise ValueError(f"algorithm {algorithm.name!r} asks for derivatives, and the problem offers none")
     if len(asked) != 1:
-        raise ValueError(f"algorithm {algorithm.name!r} asks for derivatives at {len(asked)} points at once, not at 1")
+        raise BrokenContractError(
+            f"algorithm {algorithm.name!r} asks for derivatives at {len(asked)} points at once, not at 1"
+        )
     return source.price
+
+
+def _checked_points(algorithm: AnyAlgorithm, points: Any, dimension: int) -> Array:
+    """The asked points as finite real numbers (m, dimension); raises BrokenContractError where they are none."""
+    found = points if isinstance(points, np.ndarray) else np.empty(0, dtype=object)
+    if found.dtype.kind not in "fiu":
+        kind = found.dtype.name if found is points else type(points).__name__
+        raise BrokenContractError(f"algorithm {algorithm.name!r} asks for {kind}, not for an array of real numbers")
+    if found.ndim != 2 or found.shape[1:] != (dimension,) or not len(found):
+        raise BrokenContractError(
+            f"algorithm {algorithm.name!r} asks for points of shape {found.shape}, not (points, {dimension})"
+        )
+    if not np.isfinite(found).all():
+        raise BrokenContractError(f"algorithm {algorithm.name!r} asks for a point with a coordinate that is not finite")
+    return np.asarray(found, dtype=np.float64)
 
 
 def summarise_batches(batches: Sequence[Batch]) -> Result:
@@ -216,6 +245,11 @@ def _check_problem(box: Box, population: Array, evaluations: int) -> None:
             f"the box has {box.lower.shape} lower and {box.upper.shape} upper limits for points of "
             f"{population.shape[1]} dimensions"
         )
+    check_box(box)
+
+
+def check_box(box: Box) -> None:
+    """Raises ValueError where a lower limit is not below the upper one, or a limit is not finite."""
     for d, (low, high) in enumerate(zip(box.lower, box.upper, strict=True)):
         if not -np.inf < low < high < np.inf:
             raise ValueError(f"box dimension {d}: lower limit {low} must be finite and below upper limit {high}")

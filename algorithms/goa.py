@@ -26,6 +26,7 @@ import numpy as np
 
 from algorithms.contract import Box
 from algorithms.leaders import Leaders, leader, no_leaders, promote
+from algorithms.ranges import NotNegative, Positive
 from armlab.common.arrays import Array
 
 PAIR_COORDINATES = 2**15  # 256 KiB an array
@@ -35,10 +36,10 @@ PAIR_COORDINATES = 2**15  # 256 KiB an array
 class GOAParams:
     """Table 2 for c; attraction f and its length l as in the paper."""
 
-    first_c: float = 1.0
-    last_c: float = 4e-5
-    attraction: float = 0.5
-    attraction_length: float = 1.5
+    first_c: NotNegative = 1.0
+    last_c: NotNegative = 4e-5
+    attraction: NotNegative = 0.5
+    attraction_length: Positive = 1.5
 
 
 @dataclass

@@ -28,6 +28,7 @@ import numpy as np
 
 from algorithms.contract import Box
 from algorithms.leaders import Leaders, leader, no_leaders, promote
+from algorithms.ranges import NotNegative
 from armlab.common.arrays import Array
 
 
@@ -35,7 +36,7 @@ from armlab.common.arrays import Array
 class GWOParams:
     """Table 2: the value from which a falls to 0."""
 
-    first_a: float = 2.0
+    first_a: NotNegative = 2.0
 
 
 @dataclass

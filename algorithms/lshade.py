@@ -22,12 +22,15 @@ fitness that is not finite counts as much as the largest finite one.
 """
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Ge, Interval
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from algorithms.contract import Box, as_loss
+from algorithms.ranges import NotNegative
 from armlab.common.arrays import Array
 
 MEMORY_SPREAD = 0.1  # of both distributions about a memory entry
@@ -88,9 +91,9 @@ MIN_POPULATION = 4
 class LSHADEParams:
     """history: entries of the memory. best_share: of the points that may be pbest, two at least."""
 
-    history: int = 6
-    best_share: float = 0.11
-    archive_ratio: float = 2.6
+    history: Annotated[int, Ge(1)] = 6
+    best_share: Annotated[float, Interval(gt=0, le=1)] = 0.11
+    archive_ratio: NotNegative = 2.6
 
 
 @dataclass
@@ -115,12 +118,11 @@ class LSHADE:
 
     name = "l-shade"
     Params = LSHADEParams
+    fewest = MIN_POPULATION  # a target and three others
 
     @staticmethod
     def init(params: LSHADEParams, population: Array, box: Box, horizon: int, rng: np.random.Generator) -> LSHADEState:
         n, d = population.shape
-        if n < MIN_POPULATION:
-            raise ValueError(f"L-SHADE takes a target and three others: {n} points are too few")
         history = SuccessHistory(*np.full((2, params.history), 0.5))
         fitness = np.full(n, np.inf)
         return LSHADEState(params, population.copy(), fitness, np.empty((0, d)), history, n, n * (horizon + 1), rng)

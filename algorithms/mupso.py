@@ -31,11 +31,13 @@ No other package has this algorithm; `algorithms.spso` says how particle swarms 
 """
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from annotated_types import Ge
 
 from algorithms.contract import Box, uniform_points
+from algorithms.ranges import NotNegative, Positive
 from algorithms.spso import Swarm, fly, global_best, land, new_swarm
 from armlab.common.arrays import Array
 
@@ -44,16 +46,16 @@ from armlab.common.arrays import Array
 class MuPSOParams:
     """Table 2, E and Q of eq. 6-7; velocity_limit is a fraction of the width of the box."""
 
-    first_inertia: float = 2.1
-    last_inertia: float = 0.6
-    cognitive: float = 2.24
-    first_social: float = 1.8
-    last_social: float = 3.9
-    abandonment_threshold: float = 1e-8
-    abandonment_limit: int = 10
-    mutation_threshold: float = 1e-3
+    first_inertia: Positive = 2.1
+    last_inertia: Positive = 0.6
+    cognitive: NotNegative = 2.24
+    first_social: Positive = 1.8
+    last_social: Positive = 3.9
+    abandonment_threshold: NotNegative = 1e-8
+    abandonment_limit: Annotated[int, Ge(1)] = 10
+    mutation_threshold: NotNegative = 1e-3
     stagnation: Literal["second_difference", "no_improvement"] = "second_difference"
-    velocity_limit: float = 0.5
+    velocity_limit: Positive = 0.5
 
     def __post_init__(self) -> None:
         if self.stagnation not in ("second_difference", "no_improvement"):

@@ -77,9 +77,9 @@ def names_with_derivatives() -> list[str]:
     return list(_WITH_DERIVATIVES)
 
 
-def is_plug_in(name: str) -> bool:
-    """Whether a name is neither built in nor a peer, with or without derivatives."""
-    return name not in _BUILT_IN | _PEERS | _WITH_DERIVATIVES
+def is_our_code(name: str) -> bool:
+    """Whether an algorithm's loop stands in this package: neither a plug-in nor one that runs another package's."""
+    return name in (_BUILT_IN | _WITH_DERIVATIVES).keys() - _EXTRAS.keys()
 
 
 def load(name: str) -> AnyAlgorithm:

@@ -27,6 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from algorithms.contract import Box, as_loss
+from algorithms.ranges import NotNegative, Positive
 from armlab.common.arrays import Array
 
 
@@ -87,10 +88,10 @@ def global_best(swarm: Swarm) -> tuple[Array, float]:
 class SPSOParams:
     """Table 2; velocity_limit is a fraction of the width of the box."""
 
-    inertia: float = 0.72
-    cognitive: float = 1.45
-    social: float = 1.45
-    velocity_limit: float = 0.5
+    inertia: NotNegative = 0.72
+    cognitive: NotNegative = 1.45
+    social: NotNegative = 1.45
+    velocity_limit: Positive = 0.5
 
 
 @dataclass

@@ -19,14 +19,17 @@ is the next start. `spso-sqp` gives the first half of its horizon to SPSO and st
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Ge, MinLen
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from algorithms.contract import Box, uniform_points
 from algorithms.driver import clip
 from algorithms.peers.peer import GradientPeer, Inquire, Start
+from algorithms.ranges import NotNegative, Positive, Share
 from algorithms.spso import SPSO
 from armlab.common.arrays import Array
 from armlab.common.derivatives import Derivatives, Question
@@ -43,12 +46,12 @@ class SQPParams:
     is kept, in the same unit, so that rounding breaks none. tolerance: of the solver, on f.
     """
 
-    powers: tuple[float, ...] = (10.0, 100.0, 1000.0)
-    steps: int = 15
-    cuts: int = 3
-    watch: float = 0.3
-    tightening: float = 1e-9
-    tolerance: float = 1e-10
+    powers: Annotated[tuple[Positive, ...], MinLen(1)] = (10.0, 100.0, 1000.0)
+    steps: Annotated[int, Ge(1)] = 15
+    cuts: Annotated[int, Ge(1)] = 3
+    watch: NotNegative = 0.3
+    tightening: NotNegative = 1e-9
+    tolerance: NotNegative = 1e-10
 
 
 def descend(
@@ -179,7 +182,7 @@ class SQP(GradientPeer):
 class SPSOThenSQPParams(SQPParams):
     """swarm_share: of the horizon, for SPSO with the constants of Table 2."""
 
-    swarm_share: float = 0.5
+    swarm_share: Share = 0.5
 
 
 class SPSOThenSQP(GradientPeer):

@@ -28,6 +28,7 @@ import numpy as np
 
 from algorithms.contract import Box
 from algorithms.leaders import Leaders, leader, no_leaders, promote
+from algorithms.ranges import NotNegative
 from armlab.common.arrays import Array
 
 
@@ -35,8 +36,8 @@ from armlab.common.arrays import Array
 class WOAParams:
     """Table 2: the value from which a falls to 0; b is the shape of the spiral."""
 
-    first_a: float = 2.0
-    b: float = 1.0
+    first_a: NotNegative = 2.0
+    b: NotNegative = 1.0
 
 
 @dataclass

@@ -7,7 +7,7 @@ from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_type_hints
 
-from pydantic import BeforeValidator, Field, create_model, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, create_model, model_validator
 
 from algorithms.contract import AnyAlgorithm
 from algorithms.registry import BrokenAlgorithmError, UnknownAlgorithmError, load
@@ -45,6 +45,16 @@ def _to_choice(value: Any) -> Any:
     return {"name": value} if isinstance(value, str) else value
 
 
+def _check_label(label: str) -> str:
+    """A name that fits into a line of a table."""
+    if not label.isprintable():
+        raise ValueError("should be one line of printable characters")
+    return label
+
+
+Label = Annotated[str, AfterValidator(_check_label)]
+
+
 class AlgorithmChoice(Settings):
     """An algorithm by its registered name, and the hyper-parameters that differ from its defaults.
 
@@ -52,14 +62,14 @@ class AlgorithmChoice(Settings):
     """
 
     name: str
-    label: str = ""
+    label: Label = ""
     params: dict[str, Any] = Field(default_factory=dict)
 
 
 class ProblemChoice(Settings):
     """A problem as `problem.registry` reads it, and its name in tables and figures."""
 
-    label: str
+    label: Label
     settings: dict[str, Any]
 
 
@@ -117,8 +127,8 @@ class Experiment(Settings):
     @model_validator(mode="after")
     def _nothing_twice(self) -> Self:
         lists: dict[str, list[str] | list[int]] = {
-            "problem": [problem.label for problem in self.problem],
-            "algorithms": [algorithm.label or algorithm.name for algorithm in self.algorithms],
+            "problem": ["".join(problem.label.split()) for problem in self.problem],  # blanks alone tell nobody apart
+            "algorithms": ["".join((algorithm.label or algorithm.name).split()) for algorithm in self.algorithms],
             "swarm_size": list(self.swarm_size),
             "iterations": list(self.iterations or ()),
             "evaluations": list(self.evaluations or ()),
@@ -154,7 +164,7 @@ def parse_params(params_type: type[Any], data: dict[str, Any], where: str) -> An
 
     Raises InputError, in one line, for a name it does not have, a wrong type, or a value it refuses.
     """
-    hints = get_type_hints(params_type)
+    hints = get_type_hints(params_type, include_extras=True)
     known: dict[str, Any] = {field.name: (hints[field.name], _field_default(field)) for field in fields(params_type)}
     model: type[Settings] = create_model(params_type.__name__, __base__=Settings, **known)
     checked = validate(model, data, where)

@@ -1,4 +1,6 @@
-"""Errors that end a run before its results are written."""
+"""Errors that end a run before all of it is done."""
+
+from pathlib import Path
 
 
 class StoppedError(Exception):
@@ -6,4 +8,11 @@ class StoppedError(Exception):
 
 
 class TrialsFailedError(Exception):
-    """Some trials raised; the message lists each with its error. All others are kept."""
+    """Some trials failed; the message lists each with its reason. All others are kept.
+
+    written: the results of what there is.
+    """
+
+    def __init__(self, message: str, written: tuple[Path, ...] = ()) -> None:
+        super().__init__(message)
+        self.written = written

@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from algorithms.contract import AnyAlgorithm, Box, as_loss
+from algorithms.contract import AnyAlgorithm, Box, BrokenContractError, as_loss
 from algorithms.driver import DerivativeSource, Result, minimise
 from algorithms.registry import load
 from armlab.common.arrays import Array
 from armlab.common.derivatives import Derivatives, Question
+from armlab.common.errors import describe_failure
 from bench.seeds import first_population, own_stream
 from problem.contract import DifferentiableProblem, Evaluation, Problem
 from problem.registry import ProblemSettings
@@ -62,11 +63,10 @@ class Trial:
         content |= {"problem": self.problem_text, "params": self.params_text, "code": code}
         return hashlib.sha256(canonical(content).encode()).hexdigest()
 
-    def __str__(self) -> str:
-        return (
-            f"{self.algorithm} on {self.problem_text}, swarm size {self.swarm_size}, "
-            f"{self.evaluations} evaluations, repetition {self.repetition}"
-        )
+    @property
+    def series_text(self) -> str:
+        """Algorithm, problem, swarm size and budget, in words."""
+        return f"{self.algorithm} on {self.problem_text}, swarm size {self.swarm_size}, {self.evaluations} evaluations"
 
 
 def canonical(content: Any) -> str:
@@ -121,10 +121,11 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Failure:
-    """A trial that raised an error; traceback: its text."""
+    """A trial that raised an error. reason: in one line. traceback: its text, empty where the line says it all."""
 
     trial: Trial
-    traceback: str
+    reason: str
+    traceback: str = ""
 
 
 @dataclass(frozen=True)
@@ -159,8 +160,10 @@ def _run_guarded(trial: Trial) -> Outcome | Failure:
     try:
         with np.errstate():  # what a third party makes of it ends with its trial
             return run_trial(trial)
-    except (Exception, SystemExit):  # whatever a third party raises: the runner reports it
-        return Failure(trial, traceback.format_exc())
+    except BrokenContractError as error:
+        return Failure(trial, str(error))
+    except (Exception, SystemExit) as error:  # whatever a third party raises: the runner reports it
+        return Failure(trial, describe_failure(error), traceback.format_exc())
 
 
 def run_trial(trial: Trial) -> Outcome:

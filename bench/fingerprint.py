@@ -53,6 +53,11 @@ def module_fingerprint(module: str, problem: ProblemSettings) -> str:
     return _digest([*_code_parts([module, type(problem).__module__], ()), *_data_parts(problem)])
 
 
+def algorithm_fingerprint(algorithm: AnyAlgorithm, measure: str) -> str:
+    """The same of an algorithm alone, and of the module that measures it."""
+    return _digest([f"root {algorithm.__qualname__}", *_code_parts([measure, algorithm.__module__], ())])
+
+
 def _digest(parts: list[str]) -> str:
     return hashlib.sha256("\n".join(sorted(parts)).encode()).hexdigest()
 

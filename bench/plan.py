@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, cast, overload
 
-from algorithms.contract import AnyAlgorithm, AsksDerivatives
+from algorithms.contract import AnyAlgorithm, AsksDerivatives, Box, fewest_points
+from algorithms.driver import check_box
 from algorithms.registry import load, peer_names
 from armlab.common.errors import InputError
 from bench.config import AlgorithmChoice, Experiment, ProblemChoice, find_algorithm, parse_params
@@ -97,6 +98,7 @@ def plan_trials(experiment: Experiment, where: str) -> Plan:
     """
     problems = [(choice.label, _parse_problem(choice, experiment, where)) for choice in experiment.problem]
     contestants = [_make_contestant(choice, where) for choice in experiment.algorithms]
+    _check_points(contestants, experiment.swarm_size, where)
     for (label, problem), contestant in product(problems, contestants):
         _check_derivatives(label, problem, contestant, where)
     codes = {
@@ -130,8 +132,9 @@ def _parse_problem(choice: ProblemChoice, experiment: Experiment, where: str) ->
     check_counts(settings, place)
     try:
         problem = build_problem(settings)
-    except InputError as error:
-        raise InputError(f"{place}: {error}") from None
+        check_box(Box(problem.lower, problem.upper))
+    except (InputError, ValueError) as error:
+        raise InputError(f"problem '{choice.label}' of {where}: {error}") from None
     for swarm_size in experiment.swarm_size:
         check_memory(problem, swarm_size, max(experiment.budgets(swarm_size)), where)
     return settings
@@ -141,6 +144,17 @@ def _make_contestant(choice: AlgorithmChoice, where: str) -> _Contestant:
     algorithm = find_algorithm(choice.name, f"'algorithms' in {where}")
     params = parse_params(algorithm.Params, choice.params, f"params of {choice.name} in {where}")
     return _Contestant(choice.label or choice.name, algorithm, choice.name, params)
+
+
+def _check_points(contestants: Sequence[_Contestant], swarm_sizes: Sequence[int], where: str) -> None:
+    """Raises InputError where a first population has fewer points than an algorithm takes, all of them named."""
+    lacking = [
+        f"{each.label} takes {fewest_points(each.algorithm)} points or more, not {swarm_size}"
+        for each, swarm_size in product(contestants, swarm_sizes)
+        if swarm_size < fewest_points(each.algorithm)
+    ]
+    if lacking:
+        raise InputError(f"'swarm_size' in {where}: {'; '.join(lacking)}")
 
 
 def _check_derivatives(label: str, problem: ProblemSettings, contestant: _Contestant, where: str) -> None:

@@ -6,7 +6,15 @@ from bench.config import Experiment
 from bench.files import write_with_settings
 from bench.plan import Plan, rival_pairs
 from bench.store import RunStore
-from bench.tables import as_csv, convergence_table, summary_page, summary_table, tidy_frame, times_table
+from bench.tables import (
+    as_csv,
+    convergence_table,
+    failed_sentences,
+    summary_page,
+    summary_table,
+    tidy_frame,
+    times_table,
+)
 
 Files = dict[str, str | bytes]
 
@@ -27,7 +35,7 @@ def _table_files(experiment: Experiment, entries: Plan, store: RunStore) -> File
     table = summary_table(frame)
     return {
         f"{experiment.name}.csv": as_csv(table),
-        f"{experiment.name}.md": summary_page(table, experiment),
+        f"{experiment.name}.md": summary_page(table, experiment, [f"{text}." for text in failed_sentences(frame)]),
         f"{experiment.name}_times.csv": as_csv(times_table(frame)),
     }
 

@@ -2,7 +2,7 @@
 
 import dataclasses
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,14 +10,15 @@ from typing import Protocol
 
 import yaml
 
-from algorithms.registry import is_plug_in
+from algorithms.registry import is_our_code
 from armlab.common.documents import ResultLines
 from bench.config import Experiment, read_experiment
-from bench.dispatch import claim_order, count_missing, count_missing_work, execute_missing
+from bench.dispatch import claim_order, count_missing, count_missing_work, execute_missing, stream_reports
 from bench.errors import StoppedError, TrialsFailedError
-from bench.execute import Failure, run_batch
+from bench.execute import Failure, Trial
 from bench.executors.choice import open_executor
-from bench.executors.contract import ExecutorSettings
+from bench.executors.contract import BatchExecutor, ExecutorSettings
+from bench.executors.local import local_executor
 from bench.files import check_folder
 from bench.plan import Entry, Plan, Series, plan_trials
 from bench.store import RunStore, open_store
@@ -54,7 +55,9 @@ class RunOptions:
 def run_experiment(path: Path, options: RunOptions, bar: ProgressBar) -> list[Path]:
     """Run the missing trials of a configuration and write its results; returns the written files.
 
-    Raises InputError, StoppedError, TrialsFailedError; finished trials stay in the store in any case.
+    Where trials failed, the results of all others are written, with the failed ones counted as losses, and
+    TrialsFailedError names the files. Raises InputError and StoppedError; finished trials stay in the store in any
+    case.
     """
     loaded = load_experiment(path)  # validate the configuration, plan its trials
     experiment, entries = loaded.experiment, loaded.entries
@@ -63,24 +66,35 @@ def run_experiment(path: Path, options: RunOptions, bar: ProgressBar) -> list[Pa
         if options.fresh:
             store.forget(entry.key for entry in entries)
         missing = count_missing(entries, store)  # look up the finished ones
+        failed: TrialsFailedError | None = None
         with bar(len(entries), len(entries) - missing) as progress:
-            run_missing(  # execute and store
-                entries,
-                store,
-                options.workers,
-                progress=progress.update,
-                executor=options.executor or experiment.executor,
-                timeout_s=experiment.trial_timeout_s,
-                continued_by="the same command without --fresh" if options.fresh else "the same command",
-            )
+            try:
+                run_missing(  # execute and store
+                    entries,
+                    store,
+                    options.workers,
+                    progress=progress.update,
+                    executor=options.executor or experiment.executor,
+                    timeout_s=experiment.trial_timeout_s,
+                    continued_by="the same command without --fresh" if options.fresh else "the same command",
+                )
+            except TrialsFailedError as error:
+                failed = error
         from bench.results import write_results  # pandas takes longer to import than a small run
 
-        return write_results(experiment, entries, loaded.settings, store, options.results)  # tables and figures
+        written = write_results(experiment, entries, loaded.settings, store, options.results)  # tables and figures
+    if failed is not None:
+        raise TrialsFailedError(str(failed), tuple(written))
+    return written
 
 
 def report_run(path: Path, options: RunOptions, bar: ProgressBar) -> ResultLines:
     """Run a configuration and tell the written files; the document has the rows of the tables among them."""
-    written = run_experiment(path, options, bar)
+    try:
+        written = run_experiment(path, options, bar)
+    except TrialsFailedError as error:
+        yield from map(str, error.written)
+        raise
     yield from map(str, written)
     from pandas import read_csv
 
@@ -137,18 +151,20 @@ def run_missing(
     """
     missing, batches = count_missing_work(entries, store)
     trials = [entry.trial for entry in (entries.first_entries() if isinstance(entries, Plan) else entries)]
-    isolated = any(map(is_plug_in, {trial.algorithm for trial in trials}))  # it may end its process
-    isolated = isolated or any(is_plug_in_problem(trial.problem) for trial in trials)
     failures = _Failures()
     try:
         with (
-            open_executor(executor or ExecutorSettings(), min(workers, max(batches, 1)), timeout_s, isolated) as opened,
+            open_executor(
+                executor or ExecutorSettings(), min(workers, max(batches, 1)), timeout_s, _needs_isolation(trials)
+            ) as opened,
             claim_order(entries, store.path) as ordered,
         ):
             for report in execute_missing(ordered, store, opened, timeout_s):
                 if report.outcomes:
                     store.add(report.outcomes, report.origin)
-                failures.add(report.failures)
+                if report.failures:
+                    store.note_failures((key, failure.reason) for key, failure in report.failures)
+                    failures.add([failure for _, failure in report.failures])
                 progress(len(report.results))
     except KeyboardInterrupt:
         left = count_missing(entries, store)
@@ -159,27 +175,44 @@ def run_missing(
         raise failures.error()
 
 
-_MAX_FAILURES_LISTED = 100
+def _needs_isolation(trials: Iterable[Trial]) -> bool:
+    """Whether code of another package takes part, which may end its process: that is never the command's own."""
+    return any(not is_our_code(trial.algorithm) or is_plug_in_problem(trial.problem) for trial in trials)
+
+
+_MAX_REASONS_LISTED = 100
 
 
 @dataclass
 class _Failures:
-    """How many trials failed, and the first of them."""
+    """How many trials failed, their repetitions by series and reason, and the first traceback."""
 
     count: int = 0
-    listed: list[Failure] = field(default_factory=list)
+    repetitions: dict[tuple[str, str], list[int]] = field(default_factory=dict)
+    traceback: str = ""
 
     def add(self, failures: Sequence[Failure]) -> None:
-        """Count failures; list no more than a person can read."""
+        """Count failures; those of one series with one reason are one line."""
         self.count += len(failures)
-        self.listed += failures[: _MAX_FAILURES_LISTED - len(self.listed)]
+        for failure in failures:
+            self.traceback = self.traceback or failure.traceback
+            self.repetitions.setdefault((failure.trial.series_text, failure.reason), []).append(
+                failure.trial.repetition
+            )
 
     def error(self) -> TrialsFailedError:
-        """The error that lists the failures, at least one, each with its trial."""
-        lines = [f"{failure.trial}: {failure.traceback.strip().splitlines()[-1]}" for failure in self.listed]
-        lines += [f"and {self.count - len(self.listed)} more"] if self.count > len(self.listed) else []
-        head = f"{self.count} trials raised an error and are not kept; the first one:"
-        return TrialsFailedError("\n".join([head, self.listed[0].traceback, "all of them:", *lines]))
+        """The error that lists the failures, at least one; one line where all have one reason without a traceback."""
+        lines = [
+            f"{series}, repetition {', '.join(map(str, sorted(which)))}: {reason}"
+            for (series, reason), which in self.repetitions.items()
+        ]
+        head = f"{self.count} {'trials' if self.count > 1 else 'trial'} failed, which count as losses and are not kept"
+        if len(lines) == 1 and not self.traceback:
+            return TrialsFailedError(f"{head}: {lines[0]}")
+        more = len(lines) - _MAX_REASONS_LISTED
+        lines[_MAX_REASONS_LISTED:] = [f"and {more} lines more"] if more > 0 else []
+        first = ["the first traceback:", self.traceback] if self.traceback else []
+        return TrialsFailedError("\n".join([f"{head}:", *first, *lines]))
 
 
 _TIMED_POPULATIONS = 4
@@ -221,13 +254,24 @@ def _describe_series(series: Series, repetitions: int, missing: int) -> str:
 def _estimate_seconds(missing: Mapping[Series, int]) -> float:
     """Seconds on one core, from a few timed populations of each series."""
     seconds = 0.0
-    for series, count in missing.items():
-        trial = series.first
-        if not count:
-            continue
-        short = replace(trial, evaluations=min(trial.evaluations, _TIMED_POPULATIONS * trial.swarm_size))
-        _, (_, outcome) = run_batch([("to warm the caches", short), ("to time", short)])
-        if isinstance(outcome, Failure):
-            raise _Failures(1, [outcome]).error()
-        seconds += outcome.seconds / outcome.evaluations * trial.evaluations * count
+    firsts = [series.first for series, count in missing.items() if count]
+    with local_executor(1, None, _needs_isolation(firsts)) as executor:
+        for series, count in missing.items():
+            if count:
+                seconds += count * _time_trial(series, executor)
     return seconds
+
+
+def _time_trial(series: Series, executor: BatchExecutor) -> float:
+    """Seconds of a trial; raises TrialsFailedError where it fails."""
+    trial = series.first
+    short = replace(trial, evaluations=min(trial.evaluations, _TIMED_POPULATIONS * trial.swarm_size))
+    work = [(each.key(series.code), each) for each in (short, replace(short, repetition=1))]  # to warm, and to time
+    reports = list(stream_reports(iter([work]), executor))
+    failures = [failure for report in reports for _, failure in report.failures]
+    if failures:
+        found = _Failures()
+        found.add(failures[:1])
+        raise found.error()
+    outcome = reports[-1].outcomes[-1][1]
+    return outcome.seconds / outcome.evaluations * trial.evaluations

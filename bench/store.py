@@ -28,6 +28,10 @@ CREATE TABLE arrays (
 ) WITHOUT ROWID;
 CREATE TABLE provenance (id INTEGER PRIMARY KEY, facts TEXT NOT NULL UNIQUE);
 """
+_LATER_TABLES = (  # stores of older releases have none
+    "CREATE TABLE IF NOT EXISTS failures (key TEXT PRIMARY KEY, reason TEXT NOT NULL) WITHOUT ROWID",
+    "CREATE TABLE IF NOT EXISTS measured (key TEXT PRIMARY KEY, content TEXT NOT NULL) WITHOUT ROWID",
+)
 _BEST_X = "best_x"
 _BYTES_PER_NUMBER = 8
 _LOCK_TIMEOUT_S = 60.0
@@ -64,6 +68,18 @@ class RunStore:
             (source,) = sql.execute("SELECT id FROM provenance WHERE facts = ?", (provenance,)).fetchone()
             for key, outcome in outcomes:
                 _insert_outcome(sql, key, outcome, source)
+                sql.execute("DELETE FROM failures WHERE key = ?", (key,))
+
+    def note_failures(self, reasons: Iterable[tuple[str, str]]) -> None:
+        """Remember by key why trials have no outcome, until they have one; they are run again all the same."""
+        with _errors_in_one_line(self.path), _transaction(self._connection) as sql:
+            sql.executemany("INSERT OR REPLACE INTO failures VALUES (?, ?)", reasons)
+
+    def failure(self, key: str) -> str | None:
+        """Why the last run of a trial gave no outcome; None where it was not run, or has one."""
+        with _errors_in_one_line(self.path):
+            row = self._connection.execute("SELECT reason FROM failures WHERE key = ?", (key,)).fetchone()
+        return None if row is None else str(row[0])
 
     def get(self, key: str) -> Outcome:
         """The outcome of a key; raises KeyError if it is not stored."""
@@ -95,6 +111,17 @@ class RunStore:
             found = (self._connection.execute(find, (key,)).fetchone() for key in keys)
             return list(dict.fromkeys(row[0] for row in found if row))
 
+    def measured(self, key: str) -> str | None:
+        """What was measured of some code and kept by its fingerprint, as text; None where it was not yet."""
+        with _errors_in_one_line(self.path):
+            row = self._connection.execute("SELECT content FROM measured WHERE key = ?", (key,)).fetchone()
+        return None if row is None else str(row[0])
+
+    def keep_measured(self, key: str, content: str) -> None:
+        """Keep a measurement."""
+        with _errors_in_one_line(self.path), _transaction(self._connection) as sql:
+            sql.execute("INSERT OR REPLACE INTO measured VALUES (?, ?)", (key, content))
+
     def keys(self, prefix: str) -> list[str]:
         """The keys that begin with these hexadecimal digits."""
         find = "SELECT key FROM trials WHERE key >= ? AND key < ?"
@@ -107,6 +134,7 @@ class RunStore:
             for key in keys:
                 sql.execute("DELETE FROM arrays WHERE key = ?", (key,))
                 sql.execute("DELETE FROM trials WHERE key = ?", (key,))
+                sql.execute("DELETE FROM failures WHERE key = ?", (key,))
 
 
 @contextmanager
@@ -140,6 +168,8 @@ def _prepare_schema(connection: sqlite3.Connection, path: Path) -> None:
             sql.execute(f"PRAGMA application_id = {APPLICATION_ID}")
             sql.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
         _check_header(sql, path)
+        for statement in _LATER_TABLES:
+            sql.execute(statement)
     connection.execute("PRAGMA journal_mode = WAL")
     connection.execute("PRAGMA synchronous = FULL")  # in WAL mode less would lose the last commits with the power
 

@@ -1,6 +1,6 @@
 """Tables of outcomes: trials, summaries, times, average convergence, and the summary as a Markdown page."""
 
-from collections.abc import Hashable, Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from itertools import chain, islice
 from typing import Any
@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from armlab.common.arrays import Array
+from armlab.common.errors import InputError
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.report.page import Table
 from bench.config import Experiment
@@ -16,16 +17,24 @@ from bench.execute import Curves
 from bench.plan import Entry
 from bench.printed import display_name, read_printed
 from bench.statistics import Summary, is_feasible, summarise
-from bench.store import RunStore
+from bench.store import OutcomeFigures, RunStore
 
 GROUP_COLUMNS = ["problem", "swarm_size", "budget", "algorithm"]
 _ROWS_PER_PIECE = 4096  # that are Python objects at a time; in the table a row takes some tens of bytes
 
 
 def tidy_frame(entries: Iterable[Entry], store: RunStore) -> pd.DataFrame:
-    """One row a trial in the order of the entries, which must all be in the store; arrays are not read."""
-    rows = (_trial_row(entry, store) for entry in entries)
-    return pd.concat(_frame_pieces(rows), ignore_index=True)
+    """One row a trial in the order of the entries, without those that were not run yet; arrays are not read.
+
+    A trial that failed has its reason in `failure`, which is empty elsewhere, and counts as a loss: no value, and an
+    infinite violation and fitness. Raises InputError if there is no trial at all.
+    """
+    rows = (row for entry in entries if (row := _trial_row(entry, store)) is not None)
+    pieces = list(_frame_pieces(rows))
+    if not pieces:
+        raise InputError(f"{store.path} holds none of these trials")
+    frame = pd.concat(pieces, ignore_index=True)
+    return frame.assign(dimension=frame.groupby("problem")["dimension"].transform("max"))
 
 
 def _frame_pieces(rows: Iterator[dict[str, object]]) -> Iterator[pd.DataFrame]:
@@ -33,9 +42,36 @@ def _frame_pieces(rows: Iterator[dict[str, object]]) -> Iterator[pd.DataFrame]:
         yield pd.DataFrame(list(chain([first], islice(rows, _ROWS_PER_PIECE - 1))))
 
 
-def _trial_row(entry: Entry, store: RunStore) -> dict[str, object]:
-    """The numbers and labels of one trial by column."""
-    return entry_labels(entry) | store.figures(entry.key)._asdict()
+_FAILED = OutcomeFigures(np.nan, np.inf, np.inf, evaluations=0, seconds=np.nan, dimension=0)
+
+
+def _trial_row(entry: Entry, store: RunStore) -> dict[str, object] | None:
+    """The numbers and labels of one trial by column; None where it was not run yet."""
+    if store.has(entry.key):
+        return entry_labels(entry) | store.figures(entry.key)._asdict() | {"failure": ""}
+    reason = store.failure(entry.key)
+    return None if reason is None else entry_labels(entry) | _FAILED._asdict() | {"failure": reason}
+
+
+def failed_sentences(frame: pd.DataFrame) -> list[str]:
+    """How many trials of whom failed, and why, a sentence each."""
+    failed = frame[frame["failure"] != ""]
+    return [
+        f"{len(rows)} {'trials' if len(rows) > 1 else 'trial'} of {algorithm} on {problem} failed and "
+        f"{'count' if len(rows) > 1 else 'counts'} as infeasible: {reason}"
+        for (problem, algorithm, reason), rows in failed.groupby(["problem", "algorithm", "failure"], sort=False)
+    ]
+
+
+def missing_sentences(frame: pd.DataFrame, planned: Mapping[tuple[str, str], int]) -> list[str]:
+    """How many trials of whom were not run, a sentence each; planned: trials by problem and algorithm."""
+    there = frame.groupby(["problem", "algorithm"]).size()
+    left = {pair: count - int(there.get(pair, 0)) for pair, count in planned.items()}
+    return [
+        f"{count} of {planned[problem, algorithm]} trials of {algorithm} on {problem} are missing"
+        for (problem, algorithm), count in left.items()
+        if count
+    ]
 
 
 def entry_labels(entry: Entry) -> dict[str, object]:
@@ -55,13 +91,14 @@ SUMMARY_COLUMNS = ["algorithm", *Summary.__dataclass_fields__, "evaluations"]
 def summary_table(frame: pd.DataFrame) -> pd.DataFrame:
     """One row a problem, swarm size, budget and algorithm, in the order of the frame.
 
-    evaluations: average over the repetitions. Problem and swarm size are left out where there is only one.
+    evaluations: average over the repetitions that did not fail. Problem and swarm size are left out where there is only
+    one.
     """
     rows = [
         {
             **dict(zip(GROUP_COLUMNS, names, strict=True)),
             **asdict(summarise(group["value"].to_numpy(), group["violation"].to_numpy())),
-            "evaluations": group["evaluations"].mean(),
+            "evaluations": group.loc[group["evaluations"] > 0, "evaluations"].mean(),
         }
         for names, group in frame.groupby(GROUP_COLUMNS, sort=False)
     ]
@@ -92,12 +129,20 @@ def convergence_table(entries: Sequence[Entry], store: RunStore) -> pd.DataFrame
     """
     labels = dict.fromkeys(entry.algorithm for entry in entries)
     return pd.concat(
-        [
-            _average_convergence(label, [store.get(entry.key).curves for entry in entries if entry.algorithm == label])
-            for label in labels
-        ],
+        [_average_convergence(label, _stored_curves(label, entries, store)) for label in labels],
         ignore_index=True,
     )
+
+
+def _stored_curves(label: str, entries: Sequence[Entry], store: RunStore) -> list[Curves]:
+    """The curves of an algorithm; a trial that failed has that of a run that found nothing."""
+    own = [entry for entry in entries if entry.algorithm == label]
+    return [store.get(entry.key).curves if store.has(entry.key) else _nothing_found(entry) for entry in own]
+
+
+def _nothing_found(entry: Entry) -> Curves:
+    nothing, violation = np.array([np.nan]), np.array([np.inf])
+    return Curves(np.array([float(entry.trial.swarm_size)]), nothing, violation, nothing, violation)
 
 
 def _average_convergence(label: str, curves: Sequence[Curves]) -> pd.DataFrame:
@@ -164,12 +209,12 @@ _SUMMARY_HEADINGS = {
 _PRINTED_COLUMNS = ("minimum", "average", "standard_deviation")
 
 
-def summary_page(table: pd.DataFrame, experiment: Experiment) -> str:
-    """A summary table as a Markdown page."""
+def summary_page(table: pd.DataFrame, experiment: Experiment, failures: Sequence[str] = ()) -> str:
+    """A summary table as a Markdown page; failures: sentences on the trials that failed."""
     names = [name for name in table.columns if name not in _SUMMARY_HEADINGS]
     headings = [*names, *_SUMMARY_HEADINGS.values(), *(["seconds (paper)"] if experiment.printed else [])]
     rows = [_summary_cells(row, names, experiment.printed) for row in table.to_dict("records")]
-    notes = [_SUMMARY_NOTE, *([_PRINTED_NOTE.format(name=experiment.name)] if experiment.printed else [])]
+    notes = [*failures, _SUMMARY_NOTE, *([_PRINTED_NOTE.format(name=experiment.name)] if experiment.printed else [])]
     return markdown_page(experiment.name, _settings_line(experiment), markdown_table(headings, rows), *notes)
 
 
@@ -201,4 +246,4 @@ def _summary_cells(row: dict[Hashable, Any], names: list[str], beside: bool) -> 
 def _format_number(name: str, value: float) -> str:
     if name == "feasible_share":
         return f"{value:.0%}"
-    return f"{value:.0f}" if name == "evaluations" else f"{value:.3g}"
+    return f"{value:.0f}" if name == "evaluations" and np.isfinite(value) else f"{value:.3g}"

@@ -13,13 +13,14 @@ import cma
 import numpy as np
 
 from algorithms.peers.peer import Evaluate, Peer, Start
+from algorithms.ranges import Positive
 
 
 @dataclass(frozen=True)
 class PycmaParams:
     """Initial step size as a fraction of the width of the box."""
 
-    first_step_size: float = 1.0 / math.sqrt(12.0)
+    first_step_size: Positive = 1.0 / math.sqrt(12.0)
 
 
 class Pycma(Peer):

@@ -197,9 +197,6 @@ class Peer:
 
     @classmethod
     def init(cls, params: Any, population: Array, box: Box, horizon: int, rng: np.random.Generator) -> PeerState:
-        """Raises ValueError for fewer points than the package takes."""
-        if len(population) < cls.fewest:
-            raise ValueError(f"{cls.name} takes {cls.fewest} points or more: {len(population)} are too few")
         start = Start(population.copy(), np.full(len(population), np.inf), box, horizon, int(rng.integers(2**31)))
         return PeerState(cls.search, params, start, no_leaders(population, 1))
 

@@ -52,6 +52,7 @@ class PygmoPSO(Peer):
     name = "pygmo-pso"
     rival = "spso"
     Params = PygmoPSOParams
+    fewest = 2
 
     @staticmethod
     def search(params: PygmoPSOParams, start: Start, evaluate: Evaluate) -> None:

@@ -35,6 +35,7 @@ class PymooPSO(Peer):
     name = "pymoo-pso"
     rival = "spso"
     Params = PymooPSOParams
+    fewest = 2
 
     @staticmethod
     def search(params: PymooPSOParams, start: Start, evaluate: Evaluate) -> None:

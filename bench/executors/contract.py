@@ -33,9 +33,9 @@ class WorkReport(NamedTuple):
         return [(key, result) for key, result in self.results if isinstance(result, Outcome)]
 
     @property
-    def failures(self) -> list[Failure]:
-        """The trials that failed."""
-        return [result for _, result in self.results if isinstance(result, Failure)]
+    def failures(self) -> list[tuple[str, Failure]]:
+        """The trials that failed, each with its key."""
+        return [(key, result) for key, result in self.results if isinstance(result, Failure)]
 
 
 def run_work(work: Work, timeout_s: float | None = None) -> WorkReport:

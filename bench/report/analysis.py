@@ -47,7 +47,8 @@ class Cell:
     """One problem, swarm size and budget: its trials, and the progress of its runs by algorithm.
 
     moments: numbers of evaluations, evenly spaced in the logarithm, from the first population to the budget. targets:
-    from the worst of the first feasible values to the best of all; empty if nothing feasible was found.
+    from the worst of the first feasible values to the best positive one of all, and 0 where it was reached; empty if
+    nothing feasible was found.
     """
 
     label: str
@@ -82,8 +83,8 @@ class Cell:
         return quantile_interval(self.ends(algorithm))
 
     @cached_property
-    def losses(self) -> dict[str, Array]:
-        """log10 of the ends by algorithm, an infeasible one worse than all others."""
+    def losses(self) -> pd.DataFrame:
+        """log10 of the ends, a row a repetition and a column an algorithm, an infeasible one worse than all others."""
         return log_losses(self.trials)
 
     @cached_property
@@ -96,7 +97,8 @@ class Cell:
 def analyse_cells(results: ResultSet) -> list[Cell]:
     """All cells in the order of the configuration; the runs of only one cell are in memory at a time."""
     return [
-        analyse_cell(label, trials, _sort_runs(runs_by_algorithm(curves))) for label, trials, curves in results.cells()
+        analyse_cell(label, trials, _sort_runs(runs_by_algorithm(trials, curves)))
+        for label, trials, curves in results.cells()
     ]
 
 
@@ -121,16 +123,20 @@ def _sort_runs(runs: Mapping[str, Mapping[int, Run]]) -> dict[str, list[Run]]:
 
 
 def _choose_targets(runs: Sequence[Run]) -> Array:
-    found = np.concatenate([run.best[np.isfinite(run.best)][:1] for run in runs])
-    hard = min(run.best.min() for run in runs)
-    return targets_between(found.max(), hard) if len(found) and hard > 0 else np.zeros(0)
+    found = np.concatenate([run.best[np.isfinite(run.best)] for run in runs])
+    positive = found[found > 0]
+    if not len(positive):
+        return found[:1]  # nothing but 0, or nothing feasible
+    easy = max(run.best[np.isfinite(run.best)][0] for run in runs if np.isfinite(run.best).any())
+    return targets_between(easy or positive.max(), positive.min(), exact=len(positive) < len(found))
 
 
 def _summarise_progress(runs: Sequence[Run], moments: Array, targets: Array, budget: int) -> RunProgress:
     best = np.stack([_best_at(run, moments) for run in runs], axis=1)
     times = np.stack([running_times(run, targets) for run in runs])
     spent = np.array([run.evaluations[-1] for run in runs])
-    areas = [area_under_curve(run, targets[-1], targets[0], budget) for run in runs] if len(targets) else [np.nan]
+    limits = targets[targets > 0]  # a value of 0 counts as the least positive one
+    areas = [area_under_curve(run, limits[-1], limits[0], budget) for run in runs] if len(limits) else [np.nan]
     return RunProgress(
         quartiles=np.stack([row_quantiles(best, share) for share in QUARTILES]),
         hits=condense_times(times),

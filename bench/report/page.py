@@ -25,7 +25,8 @@ from bench.result_sets.formats import make_folder, read_results
 from bench.result_sets.result_set import ResultSet
 from bench.statistics.critical_difference import block_losses, critical_difference
 from bench.statistics.performance import performance_profile
-from bench.studies.properties import AlgorithmProperties, properties_of_algorithms
+from bench.store import open_store
+from bench.studies.properties import AlgorithmProperties, measure_isolated, stored_properties
 
 _PROFILE_FACTORS = np.geomspace(1.0, 10.0, 60)
 _CURVE_POINTS = 60
@@ -115,11 +116,18 @@ def write_report(where: Path, store: Path, out: Path | None) -> Path:
     results = read_results(where, store)
     path = out or Path("results") / f"{results.name}_report.html"
     make_folder(path.parent)
-    write_whole(path, report_page(results, analyse_cells(results), _measure_participants(results)))
+    write_whole(path, report_page(results, analyse_cells(results), _measure_participants(results, store)))
     return path
 
 
-def _measure_participants(results: ResultSet) -> list[AlgorithmProperties]:
-    """Properties of the algorithms that took part and are registered here; results may come from elsewhere."""
+def _measure_participants(results: ResultSet, store: Path) -> list[AlgorithmProperties]:
+    """Properties of the algorithms that took part and are registered here; results may come from elsewhere.
+
+    They are measured once and kept in the run store, if there is one.
+    """
     took_part = dict.fromkeys(entry["name"] for entry in yaml.safe_load(results.settings)["algorithms"].values())
-    return properties_of_algorithms([name for name in took_part if name in registered()])
+    names = [name for name in took_part if name in registered()]
+    if not store.exists():
+        return [found for name in names if (found := measure_isolated(name)) is not None]
+    with open_store(store) as opened:
+        return [found for name in names if (found := stored_properties(name, opened)) is not None]

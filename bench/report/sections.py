@@ -130,12 +130,13 @@ class Origin:
 
 
 def count_sentence(results: ResultSet, cells: Sequence[Cell]) -> str:
-    """What was compared."""
+    """What was compared, and what of it failed or is missing."""
     trials = results.trials
-    return (
+    counts = (
         f"{count_of(len(cells), 'problem')}, {trials['algorithm'].nunique()} algorithms, "
         f"{trials['repetition'].nunique()} repetitions, {len(trials)} runs."
     )
+    return " ".join([counts, *(f"{gap}." for gap in results.gaps)])
 
 
 def headline(cells: Sequence[Cell], found: CriticalDifference) -> tuple[str, str]:

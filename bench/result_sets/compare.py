@@ -16,7 +16,8 @@ from armlab.common.statistics import adjust_by_holm
 from bench.result_sets.formats import read_results
 from bench.result_sets.result_set import CELL_COLUMNS, ResultSet
 from bench.statistics import is_feasible, quantile
-from bench.statistics.pairwise import log_losses, signed_rank_p, superiority, superiority_unpaired
+from bench.statistics.pairwise import log_losses, signed_rank_p
+from bench.statistics.superiority import superiority
 from bench.studies.regression.check import location_p_value
 from bench.tables import as_csv
 
@@ -87,10 +88,12 @@ def _test_difference(
 ) -> tuple[tuple[float, float, float], float]:
     both = [first.assign(algorithm="first"), second.assign(algorithm="second")]
     losses = log_losses(pd.concat(both, ignore_index=True))
-    old, new = losses["first"], losses["second"]
+    old, new = (losses[name].dropna().to_numpy() for name in ("first", "second"))
     if paired and sorted(first["repetition"]) == sorted(second["repetition"]):
-        return superiority(new, old), signed_rank_p(new, old)
-    return superiority_unpaired(new, old), float(location_p_value(old, new)) if np.ptp(np.append(old, new)) else 1.0
+        p = signed_rank_p(new, old)
+    else:
+        p = float(location_p_value(old, new)) if np.ptp(np.append(old, new)) else 1.0
+    return superiority(new, old), p
 
 
 def _median_value(trials: pd.DataFrame) -> float:
@@ -101,7 +104,7 @@ def _median_value(trials: pd.DataFrame) -> float:
 _HEADINGS = ("problem", "algorithm", "median, first", "median, second", "A12 (95 %)", "p (Holm)", "change")
 _READING = """\
 Medians of the problem's own figure; an infeasible end counts as infinite. A12: chance that an end of the second set is
-better than one of the first, with a 95 % bootstrap interval. p: {test}, two-sided, after Holm over all {count}
+better than one of the first, with its 95 % interval. p: {test}, two-sided, after Holm over all {count}
 comparisons; "change" is at 5 %."""
 _CHANGE_NAMES = {"better": "better", "worse": "worse", "=": "not told apart"}
 _TEST_NAMES = {True: "Wilcoxon's signed-rank test, paired by repetition", False: "Mann and Whitney's rank-sum test"}

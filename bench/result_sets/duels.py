@@ -18,7 +18,7 @@ from bench.studies.beyond_paper.report import subject_duels_table
 from bench.tables import as_csv
 
 _READING = """\
-A12: chance that a run of {subject} ends better than one of the other, ties counting half, with its 95 % bootstrap
+A12: chance that a run of {subject} ends better than one of the other, ties counting half, with its 95 %
 interval. `+` {subject} is better, `-` worse: paired Wilcoxon on log10 of the ends, an infeasible one counting as the
 worst, 5 % after Holm within the line."""
 

@@ -26,7 +26,6 @@ from armlab.common.report.printed_table import TABLE_FORMS
 from bench.config import NAME_PATTERN
 from bench.files import file_name
 from bench.result_sets.result_set import (
-    CELL_COLUMNS,
     TRIAL_COLUMNS,
     ResultSet,
     TableOfCurves,
@@ -43,7 +42,8 @@ _README_TEXT = """\
 `trials`: one row a trial. problem, swarm_size, budget (evaluations), algorithm, repetition: which; those with the same
 repetition began with the same first population. value: the problem's own figure of the best point, for an arm the
 condition number, without weights and penalty. violation: 0 where every limit is kept. fitness: what was minimised.
-evaluations: used. seconds: of processor time. dimension: numbers that were searched.
+evaluations: used. seconds: of processor time. dimension: numbers that were searched. failure: why a trial ended without
+an outcome, empty for all others; it counts as infeasible.
 
 `curves`: one row a trial and population. evaluations: used so far. value, violation: of the best point so far.
 
@@ -95,7 +95,8 @@ def read_tidy(folder: Path) -> ResultSet:
         raise InputError(f"{folder} is no folder of results: {error!s}".splitlines()[0]) from None
     trials_file, curves_file = (_table_file(folder, table) for table in TABLES)
     trials, curves = _read_table(trials_file, []), _read_table(curves_file, ["evaluations"])
-    _check_repetitions(trials, trials_file)
+    reasons = trials.get("failure", pd.Series("", trials.index))  # tables of older releases have none
+    trials["failure"] = reasons.astype("str").fillna("")
     _check_same_trials(trials, curves, trials_file, curves_file)
     return ResultSet(name, settings, origins, trials, TableOfCurves(curves))
 
@@ -161,7 +162,7 @@ def _read_table(path: Path, also_key: Sequence[str]) -> pd.DataFrame:
     return table
 
 
-_LEAST = {"swarm_size": 1, "budget": 1, "repetition": 0, "evaluations": 1, "violation": 0}
+_LEAST = {"swarm_size": 1, "budget": 1, "repetition": 0, "evaluations": 0, "violation": 0}
 _COUNTED = _LEAST.keys() - {"violation"}
 
 
@@ -173,18 +174,9 @@ def _check_cells(right: "pd.Series[bool]", table: pd.DataFrame, column: str, pat
         )
 
 
-def _check_repetitions(trials: pd.DataFrame, path: Path) -> None:
-    """Trials of one repetition began alike: algorithms are compared in pairs of them."""
-    for cell, rows in trials.groupby(CELL_COLUMNS, sort=False):
-        counts = rows.groupby("algorithm", sort=False)["repetition"].agg(frozenset)
-        wrong = counts[counts != counts.iloc[0]]
-        if len(wrong):
-            where = ", ".join(map(str, cell))
-            raise InputError(f"{path}: in {where}, {wrong.index[0]} has other repetitions than {counts.index[0]}")
-
-
 def _check_same_trials(trials: pd.DataFrame, curves: pd.DataFrame, trials_file: Path, curves_file: Path) -> None:
-    one, other = (set(map(tuple, table[TRIAL_COLUMNS].drop_duplicates().to_numpy())) for table in (trials, curves))
+    finished = trials[trials["failure"] == ""]
+    one, other = (set(map(tuple, table[TRIAL_COLUMNS].drop_duplicates().to_numpy())) for table in (finished, curves))
     if one != other:
         example = ", ".join(map(str, min(one ^ other, key=str)))
         raise InputError(f"{trials_file} and {curves_file} are not of the same trials: only one of them has {example}")
@@ -255,7 +247,7 @@ def write_iohprofiler(results: ResultSet, folder: Path) -> list[Path]:
         raise InputError(f"the trials of {results.name} have no column `dimension`, which IOHprofiler needs")
     written = []
     for number, (label, trials, curves) in enumerate(results.cells(), start=1):
-        for algorithm, runs in runs_by_algorithm(curves).items():
+        for algorithm, runs in runs_by_algorithm(trials, curves).items():
             place = folder / file_name(algorithm)
             written.append(
                 _write_ioh_problem(

@@ -1,6 +1,7 @@
 """A result set: the outcomes of an experiment as tidy tables, with their settings and provenance."""
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +19,7 @@ from bench.run import load_experiment
 from bench.statistics import is_feasible
 from bench.statistics.performance import Run
 from bench.store import open_store
-from bench.tables import entry_labels, tidy_frame
+from bench.tables import entry_labels, failed_sentences, missing_sentences, tidy_frame
 
 CELL_COLUMNS = ["problem", "swarm_size", "budget"]
 TRIAL_COLUMNS = [*CELL_COLUMNS, "algorithm", "repetition"]
@@ -58,20 +59,29 @@ class StoredCurves:
     plan: Plan
 
     def of(self, cell: CellKey) -> pd.DataFrame:
-        entries = self.plan.of(*cell)
         with open_store(self.store) as store:
+            entries = [entry for entry in self.plan.of(*cell) if store.has(entry.key)]
             return _curve_table(entries, [store.get(entry.key).curves for entry in entries])
 
 
 @dataclass(frozen=True, eq=False)
 class ResultSet:
-    """trials: one row a trial, as `bench.tables` makes it. settings: YAML text. origins: provenance of the outcomes."""
+    """trials: one row a trial, as `bench.tables` makes it. settings: YAML text. origins: provenance of the outcomes.
+
+    missing: which trials were not run, a sentence each.
+    """
 
     name: str
     settings: str
     origins: tuple[dict[str, Any], ...]
     trials: pd.DataFrame
     curves: CurveSource
+    missing: tuple[str, ...] = ()
+
+    @property
+    def gaps(self) -> tuple[str, ...]:
+        """What failed and what is missing, a sentence each; empty for a whole set."""
+        return (*failed_sentences(self.trials), *self.missing)
 
     @property
     def seed(self) -> int:
@@ -107,34 +117,42 @@ class ResultSet:
         return ", ".join(parts)
 
 
-def runs_by_algorithm(curves: pd.DataFrame) -> dict[str, dict[int, Run]]:
-    """The runs of one cell by algorithm and repetition; an infeasible best counts as infinite."""
-    found: dict[str, dict[int, Run]] = {}
+def runs_by_algorithm(trials: pd.DataFrame, curves: pd.DataFrame) -> dict[str, dict[int, Run]]:
+    """The runs of one cell by algorithm and repetition, in the order of the trials.
+
+    An infeasible best counts as infinite. A trial that failed has a run that spent its budget and found nothing.
+    """
+    found: dict[str, dict[int, Run]] = {str(label): {} for label in trials["algorithm"].unique()}
+    for row in trials[trials["failure"] != ""].to_dict("records"):
+        nothing = Run(np.array([float(row["budget"])]), np.array([np.inf]))
+        found[str(row["algorithm"])][int(row["repetition"])] = nothing
     feasible = is_feasible(curves["value"].to_numpy(), curves["violation"].to_numpy())
     best = curves.assign(value=np.where(feasible, curves["value"], np.inf))
     for (algorithm, repetition), rows in best.groupby(["algorithm", "repetition"], sort=False):
         run = Run(rows["evaluations"].to_numpy(float), rows["value"].to_numpy())
-        found.setdefault(str(algorithm), {})[int(str(repetition))] = run
+        found[str(algorithm)][int(str(repetition))] = run
     return found
 
 
 def read_stored_results(config: Path, path: Path) -> ResultSet:
-    """The outcomes of a configuration in a run store.
+    """The outcomes of a configuration in a run store, as far as they are there.
 
-    Raises InputError, in one line, for a mistake in the configuration, and if trials are missing.
+    Raises InputError, in one line, for a mistake in the configuration, and if there is no outcome at all.
     """
     loaded = load_experiment(config)
     if not path.exists():
         raise InputError(f"there is no run store {path}: `armlab run {config}` makes it")
     with open_store(path) as store:
-        left = count_missing(loaded.entries, store)
-        if left:
-            raise InputError(
-                f"{left} of {len(loaded.entries)} trials of {config} are not in {path}: `armlab run {config}` first"
-            )
+        if count_missing(loaded.entries, store) == len(loaded.entries):
+            raise InputError(f"none of the trials of {config} has an outcome in {path}: `armlab run {config}` first")
         trials = tidy_frame(loaded.entries, store)
         origins = tuple(json.loads(facts) for facts in store.origins(entry.key for entry in loaded.entries))
-    return ResultSet(loaded.experiment.name, loaded.settings, origins, trials, StoredCurves(path, loaded.entries))
+    planned = Counter[tuple[str, str]]()
+    for series in loaded.entries.series:
+        planned[series.problem, series.algorithm] += loaded.entries.repetitions
+    curves = StoredCurves(path, loaded.entries)
+    missing = tuple(missing_sentences(trials, planned))
+    return ResultSet(loaded.experiment.name, loaded.settings, origins, trials, curves, missing)
 
 
 def _curve_table(entries: Sequence[Entry], curves: Sequence[execute.Curves]) -> pd.DataFrame:

@@ -1,6 +1,6 @@
 """Average ranks over many problems, and groups of algorithms without a significant difference."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -10,7 +10,7 @@ from scipy.stats import friedmanchisquare, rankdata
 
 from armlab.common.arrays import Array
 from armlab.common.statistics import adjust_by_holm
-from bench.statistics.pairwise import signed_rank_p
+from bench.statistics.pairwise import paired_losses, signed_rank_p
 
 Pair = tuple[str, str]
 ERROR_RATE = 0.05
@@ -37,29 +37,36 @@ class CriticalDifference:
 
 
 def critical_difference(losses: pd.DataFrame, rate: float = ERROR_RATE) -> CriticalDifference:
-    """From finite losses: one row a block (a problem, or a repetition of one problem), one column an algorithm."""
-    ranks = average_ranks(losses)
+    """From finite losses: one row a block (a problem, or a repetition of one problem), one column an algorithm.
+
+    A block that an algorithm lacks (NaN) is left out of the ranks, and of the tests of this algorithm.
+    """
+    complete = losses.dropna()
+    ranks = average_ranks(complete)
     pairs = list(combinations(ranks, 2))
-    raw = np.array([signed_rank_p(losses[a].to_numpy(), losses[b].to_numpy()) for a, b in pairs])
+    raw = np.array([signed_rank_p(*paired_losses(losses, a, b)) for a, b in pairs])
     p = dict(zip(pairs, adjust_by_holm(raw).tolist(), strict=True))
-    return CriticalDifference(
-        ranks, p, indistinguishable_groups(list(ranks), p, rate), _friedman_p(losses), len(losses)
-    )
+    groups = indistinguishable_groups(list(ranks), p, rate)
+    return CriticalDifference(ranks, p, groups, _friedman_p(complete), len(complete))
 
 
-def block_losses(losses: Sequence[Mapping[str, Array]]) -> pd.DataFrame:
-    """Losses to rank, from those of each problem by algorithm (repetitions,), as `log_losses` gives them.
+def block_losses(losses: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """Losses to rank, from those of each problem as `log_losses` gives them.
 
     One row a problem, medians; with one problem only, one row a repetition.
     """
     if len(losses) == 1:
-        return pd.DataFrame(losses[0])
-    return pd.DataFrame([{name: float(np.median(ends)) for name, ends in one.items()} for one in losses])
+        return losses[0]
+    return pd.DataFrame([one.median() for one in losses])
 
 
 def average_ranks(losses: pd.DataFrame) -> dict[str, float]:
-    """Mean rank over the rows, best first; rank 1 is the smallest loss of a row, ties share their mean."""
-    means = rankdata(losses.to_numpy(), axis=1).mean(axis=0)
+    """Mean rank over the rows, best first; rank 1 is the smallest loss of a row, ties share their mean.
+
+    Without a row all are equal: the mean of all ranks.
+    """
+    count = losses.shape[1]
+    means = rankdata(losses.to_numpy(), axis=1).mean(axis=0) if len(losses) else np.full(count, (count + 1) / 2)
     order = np.argsort(means, kind="stable")
     return {str(losses.columns[k]): float(means[k]) for k in order}
 
@@ -78,6 +85,6 @@ def indistinguishable_groups(names: list[str], p: dict[Pair, float], rate: float
 
 def _friedman_p(losses: pd.DataFrame) -> float:
     columns: Array = losses.to_numpy().T
-    if len(columns) < 3 or np.ptp(columns, axis=0).max() == 0:
+    if len(columns) < 3 or not len(losses) or np.ptp(columns, axis=0).max() == 0:
         return float("nan")
     return float(friedmanchisquare(*columns).pvalue)

@@ -1,5 +1,5 @@
-"""Pairwise comparison of algorithms: Wilcoxon's signed-rank test, effect sizes (A12) with intervals, Holm's
-correction.
+"""Pairwise comparison of algorithms over paired repetitions: Wilcoxon's signed-rank test with Holm's correction, and
+the effect size (A12) with its interval.
 """
 
 from collections.abc import Sequence
@@ -11,9 +11,10 @@ from scipy.stats import wilcoxon
 
 from armlab.common.arrays import Array
 from armlab.common.statistics import adjust_by_holm
-from bench.statistics.ends import is_feasible, percentile_interval, resamples
+from bench.statistics.ends import is_feasible
+from bench.statistics.superiority import superiority
 
-_NUMBERS_PER_PIECE = 1_000_000  # numbers of a piece of work
+ZERO = float(np.finfo(float).tiny)  # an end of 0 counts as the least positive number, which the logarithm needs
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Duel:
     """A comparison of a subject with a rival over paired repetitions.
 
     superiority: probability that an end of the subject is better than one of the rival, ties counting half (A12, Vargha
-    and Delaney 2000), with a 95 % bootstrap interval. p: two-sided Wilcoxon signed-rank test on log10 of the ends,
+    and Delaney 2000), with its 95 % interval. p: two-sided Wilcoxon signed-rank test on log10 of the ends,
     after Holm's correction over the duels of one call.
     """
 
@@ -54,13 +55,13 @@ def duel_row(duel: Duel) -> dict[str, str | float]:
 
 def duels(frame: pd.DataFrame, pairs: Sequence[tuple[str, str]]) -> list[Duel]:
     """Duels of (subject, rival) labels in a tidy frame of one problem, swarm size and budget, with Holm's correction
-    over all of them.
+    over all of them. A repetition that one of the two lacks is left out.
     """
     losses = log_losses(frame)
-    p = adjust_by_holm(np.array([signed_rank_p(losses[subject], losses[rival]) for subject, rival in pairs]))
+    paired = [paired_losses(losses, *pair) for pair in pairs]
+    p = adjust_by_holm(np.array([signed_rank_p(*both) for both in paired]))
     return [
-        Duel(subject, rival, *superiority(losses[subject], losses[rival]), float(adjusted))
-        for (subject, rival), adjusted in zip(pairs, p, strict=True)
+        Duel(*pair, *superiority(*both), float(adjusted)) for pair, both, adjusted in zip(pairs, paired, p, strict=True)
     ]
 
 
@@ -69,20 +70,26 @@ def duels_against_all(frame: pd.DataFrame, subject: str) -> list[Duel]:
     return duels(frame, [(subject, str(rival)) for rival in frame["algorithm"].unique() if rival != subject])
 
 
-def log_losses(frame: pd.DataFrame) -> dict[str, Array]:
-    """By algorithm, log10 of its ends in the order of the repetitions; an end of 0 counts as the least number.
+def log_losses(frame: pd.DataFrame) -> pd.DataFrame:
+    """log10 of the ends, one row a repetition and one column an algorithm; NaN where a trial is missing.
 
-    An infeasible end gets a loss above every feasible one of the frame, so that it has the worst rank; two infeasible
-    ends are equal.
+    An end of 0 counts as `ZERO`. An infeasible end, and a trial that failed, gets a loss above every feasible one of
+    the frame, so that it has the worst rank; two of them are equal.
     """
     values, violations = frame["value"].to_numpy(), frame["violation"].to_numpy()
     feasible = is_feasible(values, violations)
-    logs = np.log10(np.maximum(values, np.finfo(float).tiny)[feasible])
+    logs = np.log10(np.maximum(values, ZERO)[feasible])
     worst = logs.max() + np.ptp(logs) + 1.0 if feasible.any() else 1.0
     loss = pd.Series(worst, index=frame.index)
     loss[feasible] = logs
-    ordered = frame.assign(loss=loss).sort_values("repetition", kind="stable")
-    return {str(label): rows["loss"].to_numpy() for label, rows in ordered.groupby("algorithm", sort=False)}
+    table = frame.assign(loss=loss).pivot(index="repetition", columns="algorithm", values="loss")
+    return table[frame["algorithm"].unique()].rename_axis(columns=None)
+
+
+def paired_losses(losses: pd.DataFrame, subject: str, rival: str) -> tuple[Array, Array]:
+    """The losses of two algorithms in the repetitions that both have, (n,) each."""
+    both = losses[[subject, rival]].dropna()
+    return both[subject].to_numpy(), both[rival].to_numpy()
 
 
 def signed_rank_p(subject: Array, rival: Array) -> float:
@@ -95,36 +102,3 @@ def signed_rank_p(subject: Array, rival: Array) -> float:
     if not difference.any():
         return 1.0
     return float(wilcoxon(difference, zero_method="pratt").pvalue)
-
-
-def superiority(subject: Array, rival: Array) -> tuple[float, float, float]:
-    """A12 of losses (n,) with a 95 % percentile interval; repetitions are resampled in pairs."""
-    n = len(subject)
-    counts = np.stack([np.bincount(row, minlength=n) for row in resamples(n)]).astype(float)
-    pieces = np.array_split(counts, -(-counts.size // _NUMBERS_PER_PIECE))
-    resampled = np.concatenate([_weighted_superiority(subject, rival, piece) for piece in pieces])
-    return float(_weighted_superiority(subject, rival, np.ones((1, n)))[0]), *percentile_interval(resampled)
-
-
-def _weighted_superiority(subject: Array, rival: Array, counts: Array) -> Array:
-    """A12 (m,) where each repetition counts as often as the rows of counts (m, n) say; sums of halves, so exact."""
-    n = len(subject)
-    order = np.argsort(rival)
-    below = np.searchsorted(rival[order], subject, side="left")
-    up_to = np.searchsorted(rival[order], subject, side="right")
-    passed = np.pad(counts[:, order].cumsum(axis=1), ((0, 0), (1, 0)))
-    won = n - (passed[:, up_to] + passed[:, below]) / 2
-    return np.asarray((counts * won).sum(axis=1) / n**2)
-
-
-def superiority_unpaired(subject: Array, rival: Array) -> tuple[float, float, float]:
-    """A12 of independent losses (n,) and (m,), with a 95 % percentile interval."""
-    wins = _win_matrix(subject, rival)
-    drawn = zip(resamples(len(subject)), resamples(len(rival), "rival"), strict=True)
-    resampled = np.array([wins[np.ix_(rows, columns)].mean() for rows, columns in drawn])
-    return float(wins.mean()), *percentile_interval(resampled)
-
-
-def _win_matrix(subject: Array, rival: Array) -> Array:
-    """1 where an end of the subject (rows) is better than one of the rival (columns), 1/2 where equal."""
-    return np.asarray((np.sign(rival[None, :] - subject[:, None]) + 1) / 2)

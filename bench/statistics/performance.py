@@ -22,9 +22,10 @@ class Run:
     best: Array
 
 
-def targets_between(easy: float, hard: float, count: int = 51) -> Array:
-    """Targets (count,) from easy to hard, evenly spaced in the logarithm; both positive."""
-    return np.asarray(np.geomspace(easy, hard, count))
+def targets_between(easy: float, hard: float, count: int = 51, exact: bool = False) -> Array:
+    """Targets (count,) from easy to hard, evenly spaced in the logarithm; both positive. exact: the last one is 0."""
+    targets = np.asarray(np.geomspace(easy, hard, count))
+    return np.append(targets[:-1], 0.0) if exact else targets
 
 
 def running_times(run: Run, targets: Array) -> Array:
@@ -72,8 +73,8 @@ def share_reached(found: Sequence[CondensedTimes], evaluations: Array) -> Array:
 def area_under_curve(run: Run, best: float, worst: float, budget: int) -> float:
     """Mean over the evaluations of log10 of the best so far, scaled to 0 at `best` and 1 at `worst`.
 
-    Smaller is better; 1 minus the area is IOHprofiler's area over the convergence curve. Values beyond the two limits
-    count as the limits; evaluations before the first known value count as `worst`.
+    Smaller is better; 1 minus the area is IOHprofiler's area over the convergence curve. Values beyond the two limits,
+    as 0 is, count as the limits; evaluations before the first known value count as `worst`.
     """
     level = np.append(1.0, _scale_log(run.best, best, worst))
     ends = np.concatenate([[0.0], np.minimum(run.evaluations, budget), [float(budget)]])
@@ -90,13 +91,13 @@ def _scale_log(values: Array, best: float, worst: float) -> Array:
 
 
 def performance_ratios(costs: pd.DataFrame) -> pd.DataFrame:
-    """Positive costs, one row a problem and one column an algorithm, divided by the least of the row.
+    """Costs, one row a problem and one column an algorithm, divided by the least of the row; 0 / 0 is 1.
 
     An infinite cost is a failure; if all algorithms fail, all ratios are infinite.
     """
     least = costs.min(axis=1)
     ratios = costs.div(least.where(np.isfinite(least), 1.0), axis=0)
-    return ratios.astype(float)
+    return ratios.where(costs.ne(0.0), 1.0).astype(float)
 
 
 def performance_profile(costs: pd.DataFrame, factors: Array) -> pd.DataFrame:

@@ -2,18 +2,24 @@
 overhead.
 """
 
+import json
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
+from multiprocessing import get_context
 from pathlib import Path
 
 import pandas as pd
 
 from algorithms.properties import measure_properties
+from algorithms.registry import is_our_code
 from algorithms.registry import names as registered
 from armlab.common.files import write_whole
 from armlab.common.markdown import markdown_page, markdown_table
 from bench.config import find_algorithm
+from bench.fingerprint import algorithm_fingerprint
 from bench.result_sets.formats import make_folder
+from bench.store import RunStore
 from bench.studies.speed.clock import median_seconds
 from bench.studies.speed.overhead import armlab_task
 from bench.tables import as_csv
@@ -79,6 +85,29 @@ def properties_of_algorithms(names: Sequence[str]) -> list[AlgorithmProperties]:
             )
         )
     return found
+
+
+def stored_properties(name: str, store: RunStore) -> AlgorithmProperties | None:
+    """`measure_isolated`, from the store where the same code was measured before; None where it fails."""
+    key = algorithm_fingerprint(find_algorithm(name, "properties"), __name__)
+    content = store.measured(key)
+    if content is not None:
+        return AlgorithmProperties(**json.loads(content))
+    found = measure_isolated(name)
+    if found is not None:
+        store.keep_measured(key, json.dumps(asdict(found)))
+    return found
+
+
+def measure_isolated(name: str) -> AlgorithmProperties | None:
+    """Properties of one algorithm; None where it fails. Another package's code runs in a process of its own."""
+    try:
+        if is_our_code(name):
+            return properties_of_algorithms([name])[0]
+        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+            return pool.submit(properties_of_algorithms, [name]).result()[0]
+    except Exception:  # whatever a third party raises: its trials tell it
+        return None
 
 
 def measure_overheads(names: Sequence[str]) -> dict[str, float]:

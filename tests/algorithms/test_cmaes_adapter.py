@@ -42,11 +42,6 @@ def test_it_is_finished_when_the_package_stops_on_a_flat_objective():
     assert steps == 21
 
 
-def test_a_single_point_is_refused():
-    with pytest.raises(ValueError, match="1 is too few"):
-        CMAES.init(CMAESParams(), START[:1], BOX, 3, np.random.default_rng(0))
-
-
 def test_a_generation_of_the_package_is_that_of_equations_38_to_47():
     d, n = 5, 12
     optimiser = CMA(np.full(d, 0.5), 0.02, seed=3, population_size=n)

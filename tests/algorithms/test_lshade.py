@@ -183,8 +183,3 @@ def test_scaling_factors_are_positive_and_one_at_most():
     scaling, crossover = history.rates(2000, np.random.default_rng(1))
     assert 0 < scaling.min() < scaling.max() == 1.0
     assert np.median(crossover) == pytest.approx(0.5, abs=0.01)
-
-
-def test_fewer_than_four_points_are_refused():
-    with pytest.raises(ValueError, match="3 points are too few"):
-        LSHADE.init(LSHADEParams(), np.zeros((3, 2)), BOX, HORIZON, np.random.default_rng(0))

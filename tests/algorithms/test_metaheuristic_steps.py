@@ -182,11 +182,6 @@ def test_a_trial_of_de_that_is_as_good_replaces_its_target():
     np.testing.assert_array_equal(state.population, X)
 
 
-def test_de_refuses_a_population_without_three_others():
-    with pytest.raises(ValueError, match="3 points are too few"):
-        DE.init(DEParams(), np.zeros((3, 2)), BOX, HORIZON, np.random.default_rng(0))
-
-
 def test_random_search_draws_uniformly_in_the_box(script):
     asked = asked_populations(RandomSearch, RandomSearchParams(), script(*RANDOM))
     for step in (1, 2, 3):

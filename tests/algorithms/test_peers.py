@@ -154,12 +154,6 @@ def test_a_loop_that_asks_on_after_it_was_given_up_ends_too():
     assert threading.active_count() == before
 
 
-def test_too_few_points_are_refused_in_one_line():
-    scipy_de = load("scipy-de")
-    with pytest.raises(ValueError, match="scipy-de takes 5 points or more: 4 are too few"):
-        scipy_de.init(scipy_de.Params(), START[:4], BOX, 3, np.random.default_rng(0))
-
-
 def test_a_missing_package_is_answered_with_the_extra_that_brings_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "pygmo", None)
     monkeypatch.delitem(sys.modules, "algorithms.peers.pygmo_adapter", raising=False)

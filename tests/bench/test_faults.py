@@ -153,9 +153,10 @@ def test_a_trial_that_hangs_is_ended_and_told_and_the_others_are_kept(
     assert 0 < len(stuck) < 4
     done = armlab("run", small.name)
     assert done.returncode == 1
-    assert f"{len(stuck)} trials raised an error and are not kept" in done.stderr
-    for entry in stuck:
-        assert f"{entry.trial}: WorkerLostError: the worker process died twice with this trial" in done.stderr
+    which = ", ".join(str(entry.trial.repetition) for entry in stuck)
+    assert f"{stuck[0].trial.series_text}, repetition {which}: WorkerLostError: the worker process died twice" in (
+        done.stderr
+    )
     assert "trial_timeout_s = 0.5" in done.stderr
     assert _count(small.parent / ".armlab" / "runs.sqlite") == len(entries) - len(stuck)
 
@@ -181,7 +182,7 @@ def test_a_worker_that_is_killed_by_its_trial_is_replaced_and_the_trial_named(
     assert fatal
     done = armlab("run", small.name, "--workers", "2")
     assert done.returncode == 1
-    assert f"{len(fatal)} trials raised an error" in done.stderr
+    assert f"{len(fatal)} trials failed" in done.stderr
     assert _count(small.parent / ".armlab" / "runs.sqlite") == len(entries) - len(fatal)
 
 
@@ -189,7 +190,7 @@ def test_a_worker_that_is_killed_by_its_trial_is_replaced_and_the_trial_named(
     ("fault", "said"),
     [
         ("RandomSearch.ask = staticmethod(lambda state: (state.population[:, :2], state))", "shape"),
-        ("RandomSearch.ask = staticmethod(lambda state: (None, state))", "Error"),
+        ("RandomSearch.ask = staticmethod(lambda state: (None, state))", "asks for NoneType"),
         ("RandomSearch.incumbent = staticmethod(lambda state: 1 / 0)", "ZeroDivisionError"),
     ],
 )
@@ -200,7 +201,7 @@ def test_a_plug_in_that_breaks_a_promise_is_named_and_its_neighbours_are_kept(
     small.write_text(small.read_text().replace("[spso, de]", "[plug-in, de]"))
     done = armlab("run", small.name)
     assert done.returncode == 1
-    assert "3 trials raised an error and are not kept" in done.stderr
+    assert "3 trials failed" in done.stderr
     assert said in done.stderr
     assert _count(small.parent / ".armlab" / "runs.sqlite") == 3
 
@@ -208,7 +209,7 @@ def test_a_plug_in_that_breaks_a_promise_is_named_and_its_neighbours_are_kept(
 @pytest.mark.parametrize(
     "statement",
     [
-        "population[:] = __import__('numpy').nan; __import__('numpy').random.seed(1)",
+        "population[:] = 7.0; __import__('numpy').random.seed(1)",
         "box.lower[:] = 0.9 * box.upper",
         "__import__('numpy').seterr(all='raise')",
     ],

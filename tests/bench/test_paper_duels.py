@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bench.statistics.pairwise import duels, duels_against_all, log_losses, signed_rank_p, superiority
+from bench.statistics.pairwise import duels, duels_against_all, log_losses, signed_rank_p
+from bench.statistics.superiority import superiority
 
 
 def _frame(**ends: list[float]) -> pd.DataFrame:

@@ -41,8 +41,8 @@ def test_a_result_set_has_every_trial_and_the_curve_of_each(small_run: Ran, resu
         2,
     )
     assert last["value"] == outcome.value
-    _, _, curves = list(results.cells())[-1]
-    run = runs_by_algorithm(curves)["random-search"][6]
+    _, trials, curves = list(results.cells())[-1]
+    run = runs_by_algorithm(trials, curves)["random-search"][6]
     np.testing.assert_array_equal(run.evaluations, outcome.curves.evaluations)
     np.testing.assert_array_equal(run.best, outcome.curves.best_value)
 
@@ -77,7 +77,8 @@ def test_infeasible_ends_are_infinite_in_the_curves() -> None:
     curves = pd.DataFrame(
         {"algorithm": "de", "repetition": 0, "evaluations": [5, 10], "value": [3.0, 4.0], "violation": [0.5, 0.0]}
     )
-    assert runs_by_algorithm(curves)["de"][0].best.tolist() == [np.inf, 4.0]
+    trials = pd.DataFrame({"algorithm": ["de"], "repetition": [0], "failure": [""]})
+    assert runs_by_algorithm(trials, curves)["de"][0].best.tolist() == [np.inf, 4.0]
 
 
 def test_results_that_are_not_there_are_told_in_one_line(small_run: Ran, tmp_path: Path) -> None:
@@ -86,9 +87,9 @@ def test_results_that_are_not_there_are_told_in_one_line(small_run: Ran, tmp_pat
     assert "is no folder of results" in refusal(read_results, tmp_path, small_run.store)
     assert "there is no run store" in refusal(read_results, small_run.config, tmp_path / "none.sqlite")
     assert not (tmp_path / "none.sqlite").exists()
-    more = tmp_path / "more.yaml"
-    more.write_text(CONFIG.replace("repetitions: 7", "repetitions: 8"))
-    assert refusal(read_results, more, small_run.store).startswith("6 of 48 trials of ")
+    other = tmp_path / "other.yaml"
+    other.write_text(CONFIG.replace("\nseed: ", "\nseed: 9"))
+    assert refusal(read_results, other, small_run.store).startswith("none of the trials of ")
 
 
 def test_tables_without_a_column_or_with_damage_are_told_in_one_line(small_run: Ran, tmp_path: Path) -> None:
@@ -109,7 +110,7 @@ def test_tables_without_a_column_or_with_damage_are_told_in_one_line(small_run: 
         ("trials.csv", 0, "budget", "1.5", "row 1: budget is '1.5', should be a whole number of 1 or more"),
         ("trials.csv", 1, "algorithm", "", "row 2: algorithm is 'nan', should be a name"),
         ("trials.csv", 2, "repetition", "1", "row 3: the same trial stands above it"),
-        ("trials.csv", 6, "repetition", "99", "has other repetitions than"),
+        ("trials.csv", 6, "repetition", "99", "are not of the same trials: only one of them has"),
         ("curves.csv", 5, "value", "x", "row 6: value is 'x', should be a number of 0 or more"),
         ("curves.csv", 0, "repetition", "99", "are not of the same trials: only one of them has"),
         ("settings.yaml", None, "algorithms", "{}\nname: ../x", "`name` should be 1 to 100 letters"),

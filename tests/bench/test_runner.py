@@ -77,10 +77,13 @@ def test_a_trial_that_raises_is_named_and_not_kept_and_the_others_are(small: Pat
         with pytest.raises(TrialsFailedError) as caught:
             run_missing(entries, store, 1)
         failed = list(missing_entries(entries, store))
+        reasons = [store.failure(entry.key) for entry in entries]
     assert 0 < len(failed) < len(entries)
-    for entry in entries:
-        named = f"{entry.trial}: ZeroDivisionError: of a third party" in str(caught.value)
-        assert named == (entry in failed)
+    assert reasons == ["ZeroDivisionError: of a third party" if entry in failed else None for entry in entries]
+    which = ", ".join(str(entry.trial.repetition) for entry in failed)
+    assert f"{failed[0].trial.series_text}, repetition {which}: {reasons[failed[0].trial.repetition]}" in str(
+        caught.value
+    )
 
 
 def test_ctrl_c_is_told_with_what_is_kept_and_how_to_go_on(small: Path, plug_in: PlugIn) -> None:

@@ -12,7 +12,7 @@ from scipy import stats
 from armlab.common.statistics import adjust_by_holm
 from bench.statistics.critical_difference import critical_difference, indistinguishable_groups
 from bench.statistics.ends import quantile_interval
-from bench.statistics.pairwise import signed_rank_p, superiority, superiority_unpaired
+from bench.statistics.pairwise import signed_rank_p
 from bench.statistics.performance import (
     Run,
     area_under_curve,
@@ -24,6 +24,7 @@ from bench.statistics.performance import (
     targets_between,
 )
 from bench.statistics.power import powers, signed_rank_power, smallest_detectable_effect
+from bench.statistics.superiority import superiority
 
 # Demšar 2006 (JMLR 7, 1), table 6: AUC of four variants of C4.5 on 14 data sets. The ranks printed there tell the two
 # 0.975 of the last row but one apart, which agree to the printed digits.
@@ -108,7 +109,7 @@ def test_twelve_pairs_that_all_point_one_way_have_the_exact_p_value_of_two_in_40
 def test_superiority_is_that_of_the_example_of_the_package_effsize() -> None:
     treatment = np.array([10.0, 10, 20, 20, 20, 30, 30, 30, 40, 50])
     control = np.array([10.0, 20, 30, 40, 40, 50])
-    middle, low, high = superiority_unpaired(treatment, control)  # Cliff's delta -0.25 of values: losses turn it round
+    middle, low, high = superiority(treatment, control)  # Cliff's delta -0.25 of values: losses turn it round
     assert middle == pytest.approx((1 + 0.25) / 2)
     assert low < 0.5 < middle < high <= 1.0
 

@@ -88,7 +88,7 @@ _READING = """\
 Medians of the condition number; an infeasible end counts as infinite, and the share of the feasible ones stands in
 brackets where it is not 100 %. All runs of a line have the same number of evaluations and, repetition by repetition,
 the same first population. Duels: paired Wilcoxon on log10 of the condition number, Holm within each line, 5 %; effect
-sizes (A12) with 95 % bootstrap intervals in `*_duels.csv`."""
+sizes (A12) with 95 % intervals in `*_duels.csv`."""
 _VARIANTS_READING = """\
 Chance that the variant ends better than MuPSO as published (A12, 95 % interval); `+` better, `-` worse at 5 % after
 Holm within the column."""

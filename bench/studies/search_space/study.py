@@ -117,8 +117,8 @@ _READING = """\
 Both search spaces hold the same series; in the feasible one every point keeps the limits of position, velocity and
 acceleration at every instant (`docs/problem.md`). Pairs of runs have the same numbers in their first population and the
 same budget. Medians are of the condition number; an infeasible end counts as infinite, and the share of the feasible
-ones stands in brackets where it is not 100 %. A12: chance that the run in the feasible search space ends better, with a
-95 % bootstrap interval; p: Wilcoxon's signed-rank test on log10 of the condition number, Holm over the algorithms of a
+ones stands in brackets where it is not 100 %. A12: chance that the run in the feasible search space ends better, with
+its 95 % interval; p: Wilcoxon's signed-rank test on log10 of the condition number, Holm over the algorithms of a
 problem."""
 _GIVEN_UP_READING = """\
 Feasible points: share of {points} random points of the box that keep all limits at the samples, in the coefficients and
