@@ -13,6 +13,12 @@ CR = 1 the trial is the mutant.
 Where this differs from the source: there a trial has to be better than its target; here it is enough that it is not
 worse, so the population can move on a plateau.
 
+Other readings (`reading`):
+- `text`: a trial has to be better.
+- `program`, the authors' MATLAB: r1 is a random order of the population, r2 and r3 are the same order turned by 1 to 4
+  places and again by another such number, so that one of them may be i; the mutant is x_r3 + F (x_r1 - x_r2); no
+  coordinate is forced.
+
 How peers differ: scipy defaults to best/1/bin with dithered F, updates at once and polishes the end; pygmo
 defaults to rand/1/exp; mealpy has F = 0.1 and no forced coordinate; pymoo adds polynomial mutation.
 """
@@ -26,6 +32,7 @@ from numpy.typing import NDArray
 
 from algorithms.contract import Box, as_loss
 from algorithms.ranges import Share
+from algorithms.readings import OURS, Reading
 from armlab.common.arrays import Array
 
 
@@ -35,6 +42,7 @@ class DEParams:
 
     scaling_factor: Annotated[float, Interval(ge=0, le=2)] = 0.85  # the source's range
     crossover_rate: Share = 1.0
+    reading: Reading = OURS
 
 
 @dataclass
@@ -64,7 +72,7 @@ class DE:
     @staticmethod
     def tell(state: DEState, X: Array, fitness: Array) -> DEState:
         loss = as_loss(fitness)
-        chosen = loss <= state.fitness
+        chosen = loss < state.fitness if state.params.reading == "text" and state.started else loss <= state.fitness
         np.copyto(state.population, X, where=chosen[:, None])
         np.copyto(state.fitness, loss, where=chosen)
         state.started = True
@@ -83,6 +91,8 @@ class DE:
 def _build_trials(state: DEState) -> Array:
     """Trials u = v or x of all targets (n, d), with v = x_r1 + F (x_r2 - x_r3)."""
     X, params = state.population, state.params
+    if params.reading == "program":
+        return _build_turned_trials(state)
     r1, r2, r3 = distinct_others(len(X), state.rng)
     mutants = X[r2]
     mutants -= X[r3]
@@ -92,6 +102,18 @@ def _build_trials(state: DEState) -> Array:
     forced = (state.rng.random(len(X)) * X.shape[1]).astype(np.intp)
     crossed[np.arange(len(X)), forced] = True
     return np.where(crossed, mutants, X)
+
+
+def _build_turned_trials(state: DEState) -> Array:
+    """Trials of the authors' program (n, d): one random order of the population, turned twice."""
+    X, params, rng = state.population, state.params, state.rng
+    places = np.arange(len(X))
+    turns = rng.permutation(4)[:2] + 1
+    first = rng.permutation(len(X))
+    second = first[(places + turns[0]) % len(X)]
+    third = second[(places + turns[1]) % len(X)]
+    mutants = X[third] + params.scaling_factor * (X[first] - X[second])
+    return np.where(rng.random(X.shape) < params.crossover_rate, mutants, X)
 
 
 def distinct_others(n: int, rng: np.random.Generator) -> NDArray[np.intp]:

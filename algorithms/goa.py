@@ -6,7 +6,8 @@ Update of grasshopper i in coordinate d; T is the target, the best point so far,
     s(r) = f exp(-r / l) - exp(-r),   f = 0.5, l = 1.5                                    eq. 2.3
     c = c_max - t (c_max - c_min) / horizon,   c_max = 1, c_min = 4e-5 (Table 2)          eq. 2.8
 
-The whole swarm moves together. It draws no random numbers: all chance is in the first population.
+The whole swarm moves together. It draws no random numbers: all chance is in the first population (and, in the
+reading `program`, in the extra coordinate).
 
 Where this differs from the source: there r_ij^d = |x_j^d - x_i^d| is a plain number, so the units of the coordinates
 matter, and the source maps distances into [1, 4] without an equation. Here coordinates are normalised by the box,
@@ -16,20 +17,28 @@ u = (x - lb) / (ub - lb), and
 
 so that the units do not matter. Two grasshoppers at one point exert no force on each other.
 
-How peers differ: the authors' MATLAB works on pairs of coordinates and wraps distances into [2, 4) by a
-remainder; mealpy multiplies by an extra normal number.
+Other readings (`reading`):
+- `text`: eq. 2.7 as printed, r_ij^d = |x_j^d - x_i^d| in the units of the coordinates.
+- `program`, the authors' MATLAB: it works on pairs of coordinates, each as a plane of its own, with
+  r_ij = 2 + (d_ij mod 2) and d_ij the distance in the plane, in the units of the coordinates; where their number is
+  odd it adds one coordinate from -100 to 100 that the objective does not see; c = c_max - (t + 1) (c_max - c_min) /
+  (horizon + 1).
+
+How peers differ: mealpy multiplies by an extra normal number.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from algorithms.contract import Box
+from algorithms.contract import Box, as_loss
 from algorithms.leaders import Leaders, leader, no_leaders, promote
 from algorithms.ranges import NotNegative, Positive
+from algorithms.readings import OURS, Reading
 from armlab.common.arrays import Array
 
 PAIR_COORDINATES = 2**15  # 256 KiB an array
+EXTRA_LIMIT = 100.0  # of the coordinate that the authors' program adds
 
 
 @dataclass(frozen=True)
@@ -40,6 +49,7 @@ class GOAParams:
     last_c: NotNegative = 4e-5
     attraction: NotNegative = 0.5
     attraction_length: Positive = 1.5
+    reading: Reading = OURS
 
 
 @dataclass
@@ -49,6 +59,8 @@ class GOAState:
     leaders: Leaders
     box: Box
     horizon: int
+    extra: Array  # (n,): the coordinate that the reading `program` adds
+    extra_target: float = 0.0
     iteration: int = 0
 
 
@@ -60,16 +72,20 @@ class GOA:
 
     @staticmethod
     def init(params: GOAParams, population: Array, box: Box, horizon: int, rng: np.random.Generator) -> GOAState:
-        return GOAState(params, population.copy(), no_leaders(population, 1), box, horizon)
+        adds = params.reading == "program" and population.shape[1] % 2 == 1
+        extra = rng.uniform(-EXTRA_LIMIT, EXTRA_LIMIT, len(population)) if adds else np.zeros(0)
+        return GOAState(params, population.copy(), no_leaders(population, 1), box, horizon, extra)
 
     @staticmethod
     def ask(state: GOAState) -> tuple[Array, GOAState]:
         if state.iteration > 0:
-            state.position = _hop(state)
+            state.position = _hop_in_planes(state) if state.params.reading == "program" else _hop(state)
         return state.position.copy(), state
 
     @staticmethod
     def tell(state: GOAState, X: Array, fitness: Array) -> GOAState:
+        if len(state.extra) and len(X) and as_loss(fitness).min() < state.leaders.fitness[0]:
+            state.extra_target = float(state.extra[as_loss(fitness).argmin()])
         promote(state.leaders, X, fitness)
         state.position[...] = X
         state.iteration += 1
@@ -89,9 +105,41 @@ def _hop(state: GOAState) -> Array:
     params, width = state.params, state.box.upper - state.box.lower
     progress = min(state.iteration / max(state.horizon, 1), 1.0)
     c = params.first_c - progress * (params.first_c - params.last_c)  # eq. 2.8
+    if params.reading == "text":
+        return np.asarray(c * (c * width / 2.0 * plain_forces(state.position, params)) + state.leaders.position[0])
     forces = social_forces((state.position - state.box.lower) / width, params)
     X: Array = c * (c * width / 2.0 * forces) + state.leaders.position[0]  # eq. 2.7
     return X
+
+
+def plain_forces(X: Array, params: GOAParams) -> Array:
+    """sum_j s(|x_j^d - x_i^d|) (x_j^d - x_i^d) / ||x_j - x_i|| of eq. 2.7 as printed, (n, d) -> (n, d)."""
+    difference = X[None] - X[:, None]  # x_j - x_i: (i, j, d)
+    distance = np.linalg.norm(difference, axis=2, keepdims=True)
+    distance[distance == 0.0] = 1.0  # itself or a twin: the difference is zero already
+    return np.asarray((_social(np.abs(difference), params) * difference / distance).sum(axis=1))
+
+
+def _hop_in_planes(state: GOAState) -> Array:
+    """New positions (n, d) of the authors' program, plane by plane; moves the extra coordinate in place."""
+    params = state.params
+    progress = min((state.iteration + 1) / (state.horizon + 1), 1.0)
+    c = params.first_c - progress * (params.first_c - params.last_c)
+    X, width = state.position, state.box.upper - state.box.lower
+    target = state.leaders.position[0]
+    if len(state.extra):
+        X, width = np.column_stack([X, state.extra]), np.append(width, 2.0 * EXTRA_LIMIT)
+        target = np.append(target, state.extra_target)
+    moved = np.empty_like(X)
+    for k in range(0, X.shape[1], 2):
+        difference = X[None, :, k : k + 2] - X[:, None, k : k + 2]
+        distance = np.linalg.norm(difference, axis=2, keepdims=True)
+        force = _social(2.0 + np.mod(distance, 2.0), params) * difference / (distance + np.finfo(float).eps)
+        moved[:, k : k + 2] = c * (c * width[k : k + 2] / 2.0 * force.sum(axis=1)) + target[k : k + 2]
+    if len(state.extra):
+        state.extra = np.clip(moved[:, -1], -EXTRA_LIMIT, EXTRA_LIMIT)
+        moved = moved[:, :-1]
+    return np.ascontiguousarray(moved)
 
 
 def social_forces(U: Array, params: GOAParams) -> Array:

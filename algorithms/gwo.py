@@ -12,23 +12,27 @@ three leaders. Every wolf moves, better or not. The source lets a fall linearly 
 
     a = 2 (1 - (t - 1) / horizon),   t = 1 ... horizon,
 
-2 at the first move and 2 / horizon at the last, as in the authors' code: with a = 0 all wolves would stand on one
-point.
+2 at the first move and 2 / horizon at the last: with a = 0 all wolves would stand on one point.
+
+Other readings (`reading`):
+- `text`: a falls to 0 at the last move, as the text says.
+- `program`, the authors' MATLAB: a leader that is overtaken is forgotten, not demoted, wolf by wolf; a falls by
+  1 / (horizon + 1) of its way at each move; a leader that is not known yet stands at the origin of coordinates.
 
 It is drawn to the origin of coordinates, since C multiplies a position: a property of the equations.
 
-How peers differ: the authors' MATLAB does not demote a leader that is overtaken; mealpy accepts only
-improvements; pygmo updates the leaders inside the generation, which makes the pull to the origin far
-stronger; in NiaPy a stays 2 for a budget in iterations.
+How peers differ: mealpy accepts only improvements; pygmo updates the leaders inside the generation, which makes the
+pull to the origin far stronger; in NiaPy a stays 2 for a budget in iterations.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from algorithms.contract import Box
+from algorithms.contract import Box, as_loss
 from algorithms.leaders import Leaders, leader, no_leaders, promote
 from algorithms.ranges import NotNegative
+from algorithms.readings import OURS, Reading
 from armlab.common.arrays import Array
 
 
@@ -37,6 +41,7 @@ class GWOParams:
     """Table 2: the value from which a falls to 0."""
 
     first_a: NotNegative = 2.0
+    reading: Reading = OURS
 
 
 @dataclass
@@ -57,7 +62,10 @@ class GWO:
 
     @staticmethod
     def init(params: GWOParams, population: Array, box: Box, horizon: int, rng: np.random.Generator) -> GWOState:
-        return GWOState(params, population.copy(), no_leaders(population, 3), horizon, rng)
+        leaders = no_leaders(population, 3)
+        if params.reading == "program":
+            leaders.position[...] = 0.0
+        return GWOState(params, population.copy(), leaders, horizon, rng)
 
     @staticmethod
     def ask(state: GWOState) -> tuple[Array, GWOState]:
@@ -67,7 +75,10 @@ class GWO:
 
     @staticmethod
     def tell(state: GWOState, X: Array, fitness: Array) -> GWOState:
-        promote(state.leaders, X, fitness)
+        if state.params.reading == "program":
+            _replace_leaders(state.leaders, X, as_loss(fitness))
+        else:
+            promote(state.leaders, X, fitness)
         state.position[...] = X
         state.iteration += 1
         return state
@@ -81,10 +92,25 @@ class GWO:
         return False
 
 
+def _replace_leaders(leaders: Leaders, X: Array, loss: Array) -> None:
+    """Wolf by wolf, replace the first leader that it is better than and not as good as the one above."""
+    for x, value in zip(X, loss, strict=True):
+        if value < leaders.fitness[0]:
+            place = 0
+        elif leaders.fitness[0] < value < leaders.fitness[1]:
+            place = 1
+        elif leaders.fitness[1] < value < leaders.fitness[2]:
+            place = 2
+        else:
+            continue
+        leaders.position[place], leaders.fitness[place] = x, value
+
+
 def _hunt(state: GWOState) -> None:
     """Move all wolves in place: X = mean over the leaders of X_k - A_k |C_k X_k - X| (eq. 3.3-3.7)."""
     X, leaders = state.position, state.leaders.position[:, None, :]
-    a = state.params.first_a * max(1.0 - (state.iteration - 1) / max(state.horizon, 1), 0.0)
+    moves = {"ours": state.horizon, "text": state.horizon - 1, "program": state.horizon + 1}[state.params.reading]
+    a = state.params.first_a * max(1.0 - (state.iteration - 1) / max(moves, 1), 0.0)
     A, D = state.rng.random((2, 3, *X.shape))  # r1, r2: (leader, wolf, coordinate)
     A *= 2.0 * a
     A -= a  # eq. 3.3

@@ -26,7 +26,7 @@ What the paper leaves open, and how it is read here:
 - Eq. 7 names nothing for E < F <= 1e-3 at q >= Q: the swarm then flies on as it is.
 - No speed limit is named, but w > 1 makes the swarm explode without one. Here it is half of the box width,
   Vmax = Xmax, which Shi and Eberhart 1998b advise together with a weight that falls in time. It is the same in SPSO.
-- Speeds at the start, walls and the order of updates: as in `algorithms.spso`.
+- Speeds at the start, walls and the order of updates: as in `algorithms.spso`, and so is its reading `text`.
 No other package has this algorithm; `algorithms.spso` says how particle swarms differ.
 """
 
@@ -38,6 +38,7 @@ from annotated_types import Ge
 
 from algorithms.contract import Box, uniform_points
 from algorithms.ranges import NotNegative, Positive
+from algorithms.readings import OURS, TextReading
 from algorithms.spso import Swarm, fly, global_best, land, new_swarm
 from armlab.common.arrays import Array
 
@@ -56,6 +57,7 @@ class MuPSOParams:
     mutation_threshold: NotNegative = 1e-3
     stagnation: Literal["second_difference", "no_improvement"] = "second_difference"
     velocity_limit: Positive = 0.5
+    reading: TextReading = OURS
 
     def __post_init__(self) -> None:
         if self.stagnation not in ("second_difference", "no_improvement"):
@@ -86,7 +88,8 @@ class MuPSO:
 
     @staticmethod
     def init(params: MuPSOParams, population: Array, box: Box, horizon: int, rng: np.random.Generator) -> MuPSOState:
-        return MuPSOState(params, new_swarm(population, box, params.velocity_limit), box, horizon, rng)
+        swarm = new_swarm(population, box, params.velocity_limit, params.reading)
+        return MuPSOState(params, swarm, box, horizon, rng)
 
     @staticmethod
     def ask(state: MuPSOState) -> tuple[Array, MuPSOState]:
@@ -150,6 +153,6 @@ def _must_mutate(state: MuPSOState) -> bool:
 def _mutate(state: MuPSOState) -> None:
     """Draw the whole swarm anew, at rest; it remembers nothing (eq. 8)."""
     position = uniform_points(len(state.swarm.position), state.box, state.rng)  # eq. 8
-    state.swarm = new_swarm(position, state.box, state.params.velocity_limit)
+    state.swarm = new_swarm(position, state.box, state.params.velocity_limit, state.params.reading)
     state.fitness, state.fitness_error, state.q = None, 0.0, 0
     state.mutations.append(state.iteration)

@@ -18,6 +18,9 @@ What the equations leave open, one way for SPSO and MuPSO:
   Robinson and Rahmat-Samii 2004), because the particle would push against the wall from then on;
 - the swarm moves as one: all bests are updated after the whole population is evaluated.
 
+Another reading (`reading`), of both: `text` adds nothing to eq. 1-2, no limit of the velocity, and a velocity that goes
+on at the bounds. The paper's program is not published, so there is no reading of it.
+
 How peers differ: pygmo defaults to a ring of neighbours (local best) with constriction; mealpy moves a particle only
 if the new place is better; NiaPy sets w = 1; pymoo adapts its constants; evosax has no bounds.
 """
@@ -28,6 +31,7 @@ import numpy as np
 
 from algorithms.contract import Box, as_loss
 from algorithms.ranges import NotNegative, Positive
+from algorithms.readings import OURS, TextReading
 from armlab.common.arrays import Array
 
 
@@ -35,7 +39,8 @@ from armlab.common.arrays import Array
 class Swarm:
     """Particles (n, d) with velocities, and each one's best point and fitness (n,) so far.
 
-    speed_limit (n, d): the same row for all, since numpy adds equal shapes several times faster than rows.
+    speed_limit (n, d): the same row for all, since numpy adds equal shapes several times faster than rows; infinite in
+    the reading `text`, in which a velocity goes on at the bounds.
     """
 
     position: Array
@@ -45,8 +50,9 @@ class Swarm:
     personal_best_fitness: Array
 
 
-def new_swarm(position: Array, box: Box, velocity_limit: float) -> Swarm:
+def new_swarm(position: Array, box: Box, velocity_limit: float, reading: TextReading) -> Swarm:
     """Particles at rest that remember nothing; velocity_limit is a fraction of the width of the box."""
+    velocity_limit = np.inf if reading == "text" else velocity_limit
     limit = np.tile(velocity_limit * (box.upper - box.lower), (len(position), 1))
     unknown = np.full(len(position), np.inf)
     return Swarm(position.copy(), np.zeros_like(position), limit, position.copy(), unknown)
@@ -71,7 +77,8 @@ def fly(swarm: Swarm, w: float, c1: float, c2: float, rng: np.random.Generator) 
 def land(swarm: Swarm, X: Array, fitness: Array) -> None:
     """Take the positions where the bound policy put them and remember what is better than before."""
     loss = as_loss(fitness)
-    np.copyto(swarm.velocity, 0.0, where=swarm.position != X)
+    if np.isfinite(swarm.speed_limit[0, 0]):
+        np.copyto(swarm.velocity, 0.0, where=swarm.position != X)
     swarm.position[...] = X
     better = loss < swarm.personal_best_fitness
     np.copyto(swarm.personal_best, X, where=better[:, None])
@@ -92,6 +99,7 @@ class SPSOParams:
     cognitive: NotNegative = 1.45
     social: NotNegative = 1.45
     velocity_limit: Positive = 0.5
+    reading: TextReading = OURS
 
 
 @dataclass
@@ -110,7 +118,7 @@ class SPSO:
 
     @staticmethod
     def init(params: SPSOParams, population: Array, box: Box, horizon: int, rng: np.random.Generator) -> SPSOState:
-        return SPSOState(params, new_swarm(population, box, params.velocity_limit), rng)
+        return SPSOState(params, new_swarm(population, box, params.velocity_limit, params.reading), rng)
 
     @staticmethod
     def ask(state: SPSOState) -> tuple[Array, SPSOState]:

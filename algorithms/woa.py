@@ -13,22 +13,29 @@ coordinate by coordinate. The source lets a fall linearly from 2 to 0; here
 
     a = 2 (1 - (t - 1) / horizon),   t = 1 ... horizon,
 
-2 at the first move and 2 / horizon at the last, as in the authors' code.
+2 at the first move and 2 / horizon at the last.
+
+Other readings (`reading`):
+- `text`: |A| is the length of the vector A, as the bars say, and a falls to 0 at the last move, as the text says.
+- `program`, the authors' MATLAB: one number A and one C for a whale; another random whale for each coordinate; whales
+  move one after the other, so that a random whale may have moved already; l from (a2, 1] with a2 falling from -1
+  towards -2; a and a2 fall by 1 / (horizon + 1) of their way at each move.
 
 It is drawn to the origin of coordinates, since C multiplies a position: a property of the equations.
 
-How peers differ: the authors' MATLAB draws scalar A and C for a whale, a random whale for each coordinate,
-and l from [a2, 1] with a2 falling from -1 to -2; mealpy uses one random number for A and C and takes a fresh
-uniform point in place of the random whale.
+How peers differ: mealpy uses one random number for A and C and takes a fresh uniform point in place of the random
+whale.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from algorithms.contract import Box
 from algorithms.leaders import Leaders, leader, no_leaders, promote
 from algorithms.ranges import NotNegative
+from algorithms.readings import OURS, Reading
 from armlab.common.arrays import Array
 
 
@@ -38,6 +45,7 @@ class WOAParams:
 
     first_a: NotNegative = 2.0
     b: NotNegative = 1.0
+    reading: Reading = OURS
 
 
 @dataclass
@@ -63,7 +71,7 @@ class WOA:
     @staticmethod
     def ask(state: WOAState) -> tuple[Array, WOAState]:
         if state.iteration > 0:
-            state.position = _hunt(state)
+            state.position = _hunt_in_turn(state) if state.params.reading == "program" else _hunt(state)
         return state.position.copy(), state
 
     @staticmethod
@@ -91,14 +99,36 @@ def _hunt(state: WOAState) -> Array:
     return np.where(p < 0.5, _encircle(state, random_whales, prey), spiral)  # eq. 2.6
 
 
+def _hunt_in_turn(state: WOAState) -> Array:
+    """New positions (n, d) of the authors' program: scalar A and C, whales one after the other."""
+    X, prey, params, rng = state.position.copy(), state.leaders.position[0], state.params, state.rng
+    n, d = X.shape
+    progress = min((state.iteration - 1) / (state.horizon + 1), 1.0)
+    a, last_turn = params.first_a * (1.0 - progress), -1.0 - progress
+    A, C, turn, p = rng.random((4, n))
+    A = 2.0 * a * A - a  # eq. 2.3
+    turn = 1.0 + (last_turn - 1.0) * turn
+    whales = (rng.random((n, d)) * n).astype(np.intp)
+    for i in range(n):
+        if p[i] >= 0.5:
+            X[i] = _spiral(X[i], prey, turn[i], params.b)  # eq. 2.5
+        else:
+            target = prey if abs(A[i]) < 1.0 else X[whales[i], np.arange(d)]
+            X[i] = target - A[i] * np.abs(2.0 * C[i] * target - X[i])  # eq. 2.1-2.2 or 2.7-2.8
+    return X
+
+
 def _encircle(state: WOAState, random_whales: Array, prey: Array) -> Array:
     """X* - A |C X* - X| (eq. 2.1-2.2) where |A| < 1, else X_rand - A |C X_rand - X| (eq. 2.7-2.8)."""
-    a = state.params.first_a * max(1.0 - (state.iteration - 1) / max(state.horizon, 1), 0.0)
+    as_printed = state.params.reading == "text"
+    moves = state.horizon - 1 if as_printed else state.horizon
+    a = state.params.first_a * max(1.0 - (state.iteration - 1) / max(moves, 1), 0.0)
     A, C = state.rng.random((2, *state.position.shape))  # r of eq. 2.3, r of eq. 2.4
     A *= 2.0 * a
     A -= a  # eq. 2.3
     C *= 2.0  # eq. 2.4
-    X = np.where(np.abs(A) < 1.0, prey, random_whales)
+    size = np.linalg.norm(A, axis=1, keepdims=True) if as_printed else np.abs(A)
+    X = np.where(size < 1.0, prey, random_whales)
     C *= X
     C -= state.position
     A *= np.abs(C, out=C)
@@ -106,8 +136,8 @@ def _encircle(state: WOAState, random_whales: Array, prey: Array) -> Array:
     return X
 
 
-def _spiral(X: Array, prey: Array, turn: Array, b: float) -> Array:
-    """|X* - X| exp(b l) cos(2 pi l) + X* (eq. 2.5); turn is l, (n, 1) in [-1, 1)."""
+def _spiral(X: Array, prey: Array, turn: Any, b: float) -> Array:
+    """|X* - X| exp(b l) cos(2 pi l) + X* (eq. 2.5); turn is l, (n, 1), or one number for one whale."""
     distance: Array = np.abs(prey - X)
     distance *= np.exp(b * turn) * np.cos(2.0 * np.pi * turn)
     distance += prey

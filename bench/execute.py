@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from algorithms.contract import AnyAlgorithm, Box, BrokenContractError, as_loss
 from algorithms.driver import DerivativeSource, Result, minimise
+from algorithms.readings import OURS
 from algorithms.registry import load
 from armlab.common.arrays import Array
 from armlab.common.derivatives import Derivatives, Question
@@ -53,7 +54,7 @@ class Trial:
     @property
     def params_text(self) -> str:
         """The hyper-parameters as canonical text."""
-        return canonical(dataclasses.asdict(self.params))
+        return canonical(stated_params(self.params))
 
     def key(self, code: str) -> str:
         """SHA-256 of the trial's content and of the code (see `fingerprint`) that would run it."""
@@ -67,6 +68,14 @@ class Trial:
     def series_text(self) -> str:
         """Algorithm, problem, swarm size and budget, in words."""
         return f"{self.algorithm} on {self.problem_text}, swarm size {self.swarm_size}, {self.evaluations} evaluations"
+
+
+def stated_params(params: Any) -> dict[str, Any]:
+    """Hyper-parameters by name; the reading `ours` is left out, so that trials from before it keep their streams."""
+    stated = dataclasses.asdict(params)
+    if stated.get("reading") == OURS:
+        del stated["reading"]
+    return stated
 
 
 def canonical(content: Any) -> str:

@@ -1,6 +1,5 @@
 """The flow of one experiment, from its configuration to its results; and what a run would do, without doing it."""
 
-import dataclasses
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
@@ -15,7 +14,7 @@ from armlab.common.documents import ResultLines
 from bench.config import Experiment, read_experiment
 from bench.dispatch import claim_order, count_missing, count_missing_work, execute_missing, stream_reports
 from bench.errors import StoppedError, TrialsFailedError
-from bench.execute import Failure, Trial
+from bench.execute import Failure, Trial, stated_params
 from bench.executors.choice import open_executor
 from bench.executors.contract import BatchExecutor, ExecutorSettings
 from bench.executors.local import local_executor
@@ -123,7 +122,7 @@ def _settings_text(experiment: Experiment, entries: Plan) -> str:
     firsts = entries.first_entries()
     problems = {entry.problem: entry.trial.problem.model_dump(mode="json") for entry in firsts}
     algorithms = {
-        entry.algorithm: {"name": entry.trial.algorithm, "params": dataclasses.asdict(entry.trial.params)}
+        entry.algorithm: {"name": entry.trial.algorithm, "params": stated_params(entry.trial.params)}
         for entry in firsts
     }
     settings = experiment.model_dump(mode="json", exclude_none=True, exclude={"executor", "trial_timeout_s"})

@@ -239,7 +239,8 @@ def _viscous_weights(weights: Array, motion: Motion) -> Array:
 def _matrix_weights(problem: "ExcitationProblem", motion: Motion, function: SpectralFunction) -> tuple[float, Array]:
     """The function's value and its derivative with respect to each entry of the whole matrix.
 
-    That is the observation matrix, and behind it the friction columns where the problem has them.
+    That is the observation matrix, and behind it the friction columns where the problem has them. Infinite, with
+    derivatives that are not numbers, for a motion that is not finite.
     """
     columns = problem.base.columns
     whole = observation_matrix(problem.arm, motion)
@@ -250,6 +251,8 @@ def _matrix_weights(problem: "ExcitationProblem", motion: Motion, function: Spec
     matrix = whole[:, columns]
     lengths = np.linalg.norm(matrix, axis=0) if problem.unit_columns else np.ones(len(columns))
     unit = matrix / lengths
+    if not np.isfinite(unit).all():
+        return np.inf, np.full_like(whole, np.nan)
     left, values, right = np.linalg.svd(unit, full_matrices=False)
     value, slope = function(values)
     inner = (left * slope) @ right
