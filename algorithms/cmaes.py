@@ -84,6 +84,7 @@ class CMAES:
 
     name = "cma-es"
     Params = CMAESParams
+    calls_lapack = True
     fewest = 2  # they are ranked against each other
 
     @staticmethod
@@ -151,6 +152,7 @@ class IPOPCMAES:
 
     name = "ipop-cma-es"
     Params = IPOPParams
+    calls_lapack = True
 
     @staticmethod
     def init(params: IPOPParams, population: Array, box: Box, horizon: int, rng: np.random.Generator) -> IPOPState:

@@ -1,6 +1,7 @@
 """Figures of a comparison: every end of one problem, the ranking over many, and the medians against the budget."""
 
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
@@ -10,10 +11,17 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from armlab.common.arrays import Array
 from armlab.common.streams import named_generator
-from bench.figures import FORMATS, line_style, render_figure
+from bench.figures import FORMATS, line_style, mark_zero, render_figure
 from bench.printed import display_name
 from bench.statistics import is_feasible, quantile
-from bench.statistics.critical_difference import CriticalDifference, block_losses, critical_difference
+from bench.statistics.critical_difference import (
+    CriticalDifference,
+    block_losses,
+    critical_difference,
+    paired_blocks,
+    paired_ranking,
+)
+from bench.statistics.ends import place_of_zero
 from bench.statistics.pairwise import log_losses
 from bench.tables import GROUP_COLUMNS, summary_table
 
@@ -24,10 +32,19 @@ _ROW_HEIGHT = 0.34  # inches
 _SPREAD = 0.28  # of the dots of one row about its middle, in rows
 
 
-def draw_ends(frame: pd.DataFrame, known: Mapping[str, float], formats: Sequence[str] = FORMATS) -> dict[str, bytes]:
+CONDITION_NUMBER = "condition number (-)"
+
+
+def draw_ends(
+    frame: pd.DataFrame,
+    known: Mapping[str, float],
+    formats: Sequence[str] = FORMATS,
+    figures: Mapping[str, str] = MappingProxyType({}),
+) -> dict[str, bytes]:
     """Every end of each algorithm, with median, quartiles and the best known as a line; a panel a problem.
 
-    frame: tidy, one swarm size and budget. known: best condition numbers by problem. PNG and SVG bytes.
+    frame: tidy, one swarm size and budget. known: best values by problem. figures: what a problem's value is, by
+    problem, the condition number if left out. PNG and SVG bytes.
     """
     problems = [str(problem) for problem in frame["problem"].unique()]
     labels = [str(label) for label in frame["algorithm"].unique()]
@@ -36,7 +53,7 @@ def draw_ends(frame: pd.DataFrame, known: Mapping[str, float], formats: Sequence
         panels = figure.subplots(1, len(problems), squeeze=False, sharey=True)[0]
         for axes, problem in zip(panels, problems, strict=True):
             _draw_ends_panel(axes, frame[frame["problem"] == problem], labels, known.get(problem))
-            axes.set(title=problem, xlabel="condition number (-)")
+            axes.set(title=problem, xlabel=figures.get(problem, CONDITION_NUMBER))
         panels[0].set(yticks=range(len(labels)), yticklabels=[display_name(label) for label in labels])
         panels[0].invert_yaxis()
         handles, texts = panels[0].get_legend_handles_labels()
@@ -48,7 +65,10 @@ def draw_ends(frame: pd.DataFrame, known: Mapping[str, float], formats: Sequence
 def _draw_ends_panel(axes: Axes, frame: pd.DataFrame, labels: list[str], known: float | None) -> None:
     axes.set_xscale("log")
     losses = np.where(is_feasible(frame["value"].to_numpy(), frame["violation"].to_numpy()), frame["value"], np.inf)
-    _set_plain_ticks(axes, losses[np.isfinite(losses)])
+    zero = place_of_zero(losses)
+    _set_plain_ticks(axes, losses[np.isfinite(losses) & (losses > 0)])
+    mark_zero(axes, zero)
+    losses = np.where(losses == 0, zero, losses) if zero is not None else losses
     _draw_best_known(axes.axvline, known)
     if not np.isfinite(losses).all():
         axes.set_xmargin(0.22)  # room for the notes on infeasible ends
@@ -93,12 +113,16 @@ def _set_plain_ticks(axes: Axes, values: Array) -> None:
 def draw_ranking(frame: pd.DataFrame, formats: Sequence[str] = FORMATS) -> dict[str, bytes]:
     """Rank of each algorithm in every problem, its average, and the groups that no test tells apart.
 
-    frame: tidy. The ranks are those of medians over problems, or of ends over the repetitions of a single problem. PNG
-    and SVG bytes.
+    frame: tidy. The ranks are those of medians over problems or, of too few problems or a single one, those of ends
+    over the repetitions. PNG and SVG bytes.
     """
     cells = ["problem", "swarm_size", "budget"]
-    losses = block_losses([log_losses(rows) for _, rows in frame.groupby(cells, sort=False)])
-    found = critical_difference(losses)
+    by_cell = [log_losses(rows) for _, rows in frame.groupby(cells, sort=False)]
+    losses = block_losses(by_cell)
+    found, blocks = critical_difference(losses), f"{len(losses)} {_block_name(frame)}"
+    if found.has_too_few_blocks and len(by_cell) > 1:
+        losses, found = paired_blocks(by_cell), paired_ranking(by_cell)
+        blocks = f"{len(losses)} repetitions of {blocks}"
     count = len(found.ranks)
 
     def fill(figure: Figure) -> None:
@@ -106,7 +130,6 @@ def draw_ranking(frame: pd.DataFrame, formats: Sequence[str] = FORMATS) -> dict[
         _draw_ranks(axes, losses, found)
         _draw_groups(axes, found)
         axes.set(yticks=range(count), yticklabels=[display_name(name) for name in found.ranks])
-        blocks = f"{found.blocks} {_block_name(frame)}"
         too_few = ", too few to tell any two apart" if found.has_too_few_blocks else ""
         axes.set(xlabel=f"rank (1: best) in {blocks}{too_few}", xticks=range(1, count + 1))
         axes.invert_yaxis()
@@ -143,10 +166,15 @@ def _draw_groups(axes: Axes, found: CriticalDifference) -> None:
         axes.plot([x, x], [rows[group[0]] - 0.3, rows[group[-1]] + 0.3], color="black", linewidth=2.5, label=text)
 
 
-def draw_budgets(frame: pd.DataFrame, known: Mapping[str, float], formats: Sequence[str] = FORMATS) -> dict[str, bytes]:
+def draw_budgets(
+    frame: pd.DataFrame,
+    known: Mapping[str, float],
+    formats: Sequence[str] = FORMATS,
+    figures: Mapping[str, str] = MappingProxyType({}),
+) -> dict[str, bytes]:
     """Median and quartiles against the budget, a panel a problem, each with its own scale.
 
-    known: best condition numbers by problem, drawn as a line.
+    known: best values by problem, drawn as a line. figures: as in `draw_ends`.
     """
     problems = list(frame["problem"].unique())
 
@@ -162,7 +190,7 @@ def draw_budgets(frame: pd.DataFrame, known: Mapping[str, float], formats: Seque
             budgets = sorted(frame["budget"].unique())
             axes.set_xticks(budgets, [f"{budget:,}" for budget in budgets])
             axes.xaxis.set_minor_locator(NullLocator())
-        panels[0].set_ylabel("condition number, median and quartiles (-)")
+            axes.set_ylabel(f"{figures.get(str(problem), CONDITION_NUMBER)}, median and quartiles")
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=4 * len(problems))
 
@@ -173,6 +201,10 @@ def _draw_budget_panel(axes: Axes, frame: pd.DataFrame) -> None:
     """Medians that are infinite, where most ends are infeasible, are left out."""
     budgets = frame.drop_duplicates(GROUP_COLUMNS)["budget"].to_numpy()  # in the order of the summary
     table = summary_table(frame).assign(budget=budgets)
+    columns = ["lower_quartile", "median", "upper_quartile"]
+    zero = place_of_zero(table[columns].to_numpy())
+    mark_zero(axes, zero, upright=True)
+    table[columns] = table[columns].replace(0.0, zero)
     for index, (label, group) in enumerate(table.groupby("algorithm", sort=False)):
         color, linestyle, marker = line_style(index)
         rows = group[np.isfinite(group["median"])]

@@ -7,6 +7,7 @@ from io import BytesIO
 from typing import NamedTuple
 
 import matplotlib
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,6 +15,7 @@ from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from armlab.common.report import palette
 from bench.printed import display_name
+from bench.statistics.ends import place_of_zero
 
 # Okabe and Ito 2008: told apart by readers with any colour vision; yellow is left out, too pale for a line. Then grey
 # and four of Tol's muted colours; with as many lines, the markers help.
@@ -93,6 +95,18 @@ def _image_bytes(figure: Figure, suffix: str) -> bytes:
     return buffer.getvalue()
 
 
+def mark_zero(axes: Axes, place: float | None, *, upright: bool = False) -> None:
+    """A dotted line where 0 stands on the logarithmic axis, with its number; upright: on the vertical axis."""
+    if place is None:
+        return
+    draw_line = axes.axhline if upright else axes.axvline
+    draw_line(place, color="black", linewidth=0.8, linestyle=":")
+    transform = axes.get_yaxis_transform() if upright else axes.get_xaxis_transform()
+    where = (1.01, place) if upright else (place, 1.01)
+    sides = ("left", "center") if upright else ("center", "bottom")
+    axes.text(*where, "0", transform=transform, ha=sides[0], va=sides[1], fontsize=8)
+
+
 _SWARM_SIZE_LABEL = "swarm size (particles)"
 
 
@@ -133,22 +147,40 @@ def draw_times(times: pd.DataFrame) -> dict[str, bytes]:
     return render_panels(1, draw)
 
 
-_CONVERGENCE_PANELS = {"best_so_far": "best so far", "present_best": "present best of the algorithm"}
+_CONVERGENCE_PANELS = {
+    "median_best_so_far": "best so far, median",
+    "median_present_best": "present best of the algorithm, median",
+    "best_so_far": "best so far, average as in the paper",
+    "present_best": "present best, average as in the paper",
+}
 
 
 def draw_convergence(table: pd.DataFrame) -> dict[str, bytes]:
-    """Best so far and present best, averaged, from a convergence table; PNG and SVG bytes."""
+    """Best so far and present best from a convergence table, medians above and averages below; PNG and SVG bytes.
 
-    def draw(axes: Sequence[Axes]) -> None:
-        for panel, (column, title) in zip(axes, _CONVERGENCE_PANELS.items(), strict=True):
+    Medians count an infeasible point as infinite, and such medians are not drawn. Averages leave such points out, so
+    that a best so far may rise where a worse run becomes feasible.
+    """
+
+    def fill(figure: Figure) -> None:
+        panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
+        for panel, (column, title) in zip(panels, _CONVERGENCE_PANELS.items(), strict=True):
+            zero = place_of_zero(table[column].to_numpy())
+            mark_zero(panel, zero, upright=True)
             for index, (label, rows) in enumerate(table.groupby("algorithm", sort=False)):
                 color, linestyle, _ = line_style(index)
                 name = display_name(str(label))
-                panel.plot(rows["iteration"], rows[column], label=name, color=color, linestyle=linestyle)
-            panel.set(title=title, xlabel="iteration (0: first population)", yscale="log")
-        axes[0].yaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))  # powers of ten alone may be out of range
-        axes[0].yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        axes[0].yaxis.set_minor_formatter(NullFormatter())
-        axes[0].set_ylabel("average condition number, feasible ends (-)")
+                drawn = rows[column].where(np.isfinite(rows[column])).replace(0.0, zero)
+                panel.plot(rows["iteration"], drawn, label=name, color=color, linestyle=linestyle)
+            panel.set(title=title, yscale="log")
+            panel.label_outer()
+        panels[0].yaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))  # powers of ten alone may be out of range
+        panels[0].yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        panels[0].yaxis.set_minor_formatter(NullFormatter())
+        figure.supxlabel("iteration (0: first population)", fontsize=9)
+        panels[0].set_ylabel("condition number (-)")
+        panels[2].set_ylabel("condition number, feasible ends (-)")
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=6)
 
-    return render_panels(2, draw)
+    return render_figure((9.2, 7.0), fill)

@@ -30,10 +30,22 @@ def write_with_settings(folder: Path, name: str, files: Mapping[str, str | bytes
     return list(contents)
 
 
+_DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{k}" for port in ("com", "lpt") for k in range(10))}
+_MAX_NAME = 60  # characters: of the 255 of a file system, some are the names around it
+
+
 def file_name(label: str) -> str:
-    """A label as a part of a file's name, another one for each label."""
-    plain = re.sub(r"[^A-Za-z0-9.-]+", "_", label)
-    return plain if plain == label and plain.strip(".") else f"{plain}_{sha256(label.encode()).hexdigest()[:6]}"
+    """A label as a part of a file's name on any system, another one for each label.
+
+    A label that has only small letters, digits, dots and dashes, is short and begins with a letter or digit stays as it
+    is. Any other gets a part of its hash, since systems that ignore the case of letters would take two for one, hide
+    what begins with a dot, and keep the names of devices for themselves.
+    """
+    stays = re.fullmatch(r"[a-z0-9]([a-z0-9.-]*[a-z0-9])?", label) and len(label) <= _MAX_NAME
+    if stays and label.partition(".")[0] not in _DEVICES:
+        return label
+    plain = re.sub(r"[^A-Za-z0-9-]+", "_", label).strip("_-")[:_MAX_NAME]
+    return f"{plain or 'label'}_{sha256(label.encode()).hexdigest()[:6]}"
 
 
 def check_folder(folder: Path, name: str, settings: str, overwrite: bool = False) -> None:

@@ -4,7 +4,10 @@ Code: the modules that the imports lead to from three roots, which are `bench.ex
 streams), the module of the algorithm and the module of the problem's settings. A Python module counts by its abstract
 syntax without comments and docstrings, C by its bytes. Another package counts by its version: a peer's package is the
 search itself, and numpy may change a random stream or a rounding with every release (NEP 19). Data: the robot files
-that the settings name, the definition of a suite's problem, and the data files of a third party's package.
+that the settings name, the definition of a suite's problem, and the data files of a third party's package. Processor:
+where an algorithm calls LAPACK (class attribute `calls_lapack`), the kernels of BLAS and the SIMD level, since its
+decisions turn the last digit into another path; a third party's algorithm counts as one unless it says that it does
+not. All other algorithms give the same numbers up to the last few digits on any processor.
 """
 
 import ast
@@ -20,7 +23,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from algorithms.contract import AnyAlgorithm, AsksDerivatives
+from algorithms.registry import is_our_code
 from bench.execute import canonical
+from bench.processor import processor_kernels
 from problem.registry import ProblemSettings
 from problem.robot_file import BUILT_IN_FOLDER
 from problem.suite import InstanceSettings, definition_of
@@ -45,7 +50,14 @@ def fingerprint(algorithm: AnyAlgorithm, problem: ProblemSettings) -> str:
     parts = [f"root {code.__module__}:{code.__qualname__}" for code in classes]
     unused = () if issubclass(algorithm, AsksDerivatives) else (_DERIVATIVES,)
     parts += _code_parts([_ROOT, *(code.__module__ for code in classes)], unused)
+    if calls_lapack(algorithm):
+        parts.append(f"processor {canonical(processor_kernels())}")
     return _digest([*parts, *_data_parts(problem)])
+
+
+def calls_lapack(algorithm: AnyAlgorithm) -> bool:
+    """Whether the path of an algorithm depends on the kernels of BLAS and LAPACK."""
+    return bool(getattr(algorithm, "calls_lapack", not is_our_code(algorithm.name)))
 
 
 def module_fingerprint(module: str, problem: ProblemSettings) -> str:

@@ -8,16 +8,20 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.processor import blas_threads, processor_kernels
+
 _PACKAGES = ("armlab", "numpy", "scipy", "cmaes", "joblib")
 
 
 def provenance() -> str:
-    """JSON text with the versions, BLAS, processor, operating system and commit of this installation."""
+    """JSON text with versions, kernels and threads of BLAS, SIMD level, processor, system and commit."""
     blas = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
     facts = {
         "python": platform.python_version(),
         **{package: version(package) for package in _PACKAGES},
         "blas": f"{blas['name']} {blas['version']}",
+        **processor_kernels(),
+        "blas_threads": blas_threads(),
         "processor": _processor_name(),
         "system": platform.platform(),
         "commit": _git_commit(),

@@ -1,9 +1,12 @@
 """The result files of an experiment, from the run store: tables, figures, and the settings that made them."""
 
+import json
 from pathlib import Path
 
+from algorithms.registry import load
 from bench.config import Experiment
 from bench.files import write_with_settings
+from bench.fingerprint import calls_lapack
 from bench.plan import Plan, rival_pairs
 from bench.store import RunStore
 from bench.tables import (
@@ -33,11 +36,26 @@ def write_results(experiment: Experiment, entries: Plan, settings: str, store: R
 def _table_files(experiment: Experiment, entries: Plan, store: RunStore) -> Files:
     frame = tidy_frame(entries, store)
     table = summary_table(frame)
+    notes = [*(f"{text}." for text in failed_sentences(frame)), *_processor_notes(entries, store)]
     return {
         f"{experiment.name}.csv": as_csv(table),
-        f"{experiment.name}.md": summary_page(table, experiment, [f"{text}." for text in failed_sentences(frame)]),
+        f"{experiment.name}.md": summary_page(table, experiment, notes),
         f"{experiment.name}_times.csv": as_csv(times_table(frame)),
     }
+
+
+def _processor_notes(entries: Plan, store: RunStore) -> list[str]:
+    """For whom the numbers of algorithms that call LAPACK hold, a sentence; empty without any."""
+    series = [each for each in entries.series if calls_lapack(load(each.first.algorithm))]
+    if not series:
+        return []
+    keys = (each.entry(repetition).key for each in series for repetition in range(entries.repetitions))
+    origins = [json.loads(facts) for facts in store.origins(keys)]
+    places = dict.fromkeys(
+        f"{each.get('processor')} ({each.get('blas_kernels')}; {each.get('simd')})" for each in origins
+    )
+    names = ", ".join(dict.fromkeys(each.algorithm for each in series))
+    return [f"These call LAPACK, and another processor gives them other numbers: {names}. Here: {'; '.join(places)}."]
 
 
 def _rivals_files(experiment: Experiment, entries: Plan, store: RunStore) -> Files:

@@ -17,6 +17,7 @@ from bench.execute import Curves
 from bench.plan import Entry
 from bench.printed import display_name, read_printed
 from bench.statistics import Summary, is_feasible, summarise
+from bench.statistics.ends import row_quantiles
 from bench.store import OutcomeFigures, RunStore
 
 GROUP_COLUMNS = ["problem", "swarm_size", "budget", "algorithm"]
@@ -124,8 +125,9 @@ def as_csv(table: pd.DataFrame) -> str:
 def convergence_table(entries: Sequence[Entry], store: RunStore) -> pd.DataFrame:
     """One row an algorithm and iteration; iteration 0 is the first population.
 
-    best_so_far, present_best: averages over the repetitions whose point is feasible at that time, NaN if there are
-    none; the two shares give how many those are.
+    median_best_so_far, median_present_best: over all repetitions, an infeasible point counting as infinite, so that the
+    first never rises. best_so_far, present_best: the paper's averages, over the repetitions whose point is feasible at
+    that time, NaN if there are none; the two shares give how many those are.
     """
     labels = dict.fromkeys(entry.algorithm for entry in entries)
     return pd.concat(
@@ -147,19 +149,23 @@ def _nothing_found(entry: Entry) -> Curves:
 
 def _average_convergence(label: str, curves: Sequence[Curves]) -> pd.DataFrame:
     moments = np.unique(np.concatenate([curve.evaluations for curve in curves]))
-    best, best_share = _feasible_mean(
+    best_ends = (
         _align_curves(moments, curves, [curve.best_value for curve in curves]),
         _align_curves(moments, curves, [curve.best_violation for curve in curves]),
     )
-    present, present_share = _feasible_mean(
+    present_ends = (
         _align_curves(moments, curves, [curve.present_value for curve in curves]),
         _align_curves(moments, curves, [curve.present_violation for curve in curves]),
     )
+    best, best_share = _feasible_mean(*best_ends)
+    present, present_share = _feasible_mean(*present_ends)
     return pd.DataFrame(
         {
             "algorithm": label,
             "iteration": np.arange(len(moments)),
             "evaluations": moments,
+            "median_best_so_far": _median_end(*best_ends),
+            "median_present_best": _median_end(*present_ends),
             "best_so_far": best,
             "best_so_far_feasible_share": best_share,
             "present_best": present,
@@ -175,6 +181,11 @@ def _align_curves(moments: Array, curves: Sequence[Curves], rows: Sequence[Array
     """
     places = [np.searchsorted(curve.evaluations, moments, side="right") - 1 for curve in curves]
     return np.stack([row[np.maximum(place, 0)] for row, place in zip(rows, places, strict=True)])
+
+
+def _median_end(values: Array, violations: Array) -> Array:
+    """Median of each column of (n, k), where an infeasible entry is infinite."""
+    return row_quantiles(np.where(is_feasible(values, violations), values, np.inf).T, 0.5)
 
 
 def _feasible_mean(values: Array, violations: Array) -> tuple[Array, Array]:
@@ -209,12 +220,12 @@ _SUMMARY_HEADINGS = {
 _PRINTED_COLUMNS = ("minimum", "average", "standard_deviation")
 
 
-def summary_page(table: pd.DataFrame, experiment: Experiment, failures: Sequence[str] = ()) -> str:
-    """A summary table as a Markdown page; failures: sentences on the trials that failed."""
+def summary_page(table: pd.DataFrame, experiment: Experiment, remarks: Sequence[str] = ()) -> str:
+    """A summary table as a Markdown page; remarks: sentences on these trials, such as those that failed."""
     names = [name for name in table.columns if name not in _SUMMARY_HEADINGS]
     headings = [*names, *_SUMMARY_HEADINGS.values(), *(["seconds (paper)"] if experiment.printed else [])]
     rows = [_summary_cells(row, names, experiment.printed) for row in table.to_dict("records")]
-    notes = [*failures, _SUMMARY_NOTE, *([_PRINTED_NOTE.format(name=experiment.name)] if experiment.printed else [])]
+    notes = [*remarks, _SUMMARY_NOTE, *([_PRINTED_NOTE.format(name=experiment.name)] if experiment.printed else [])]
     return markdown_page(experiment.name, _settings_line(experiment), markdown_table(headings, rows), *notes)
 
 

@@ -29,6 +29,7 @@ class Pycma(Peer):
     name = "pycma"
     rival = "cma-es"
     Params = PycmaParams
+    calls_lapack = True
     fewest = 4
 
     @staticmethod

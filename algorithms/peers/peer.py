@@ -183,12 +183,14 @@ class Peer:
 
     search(params, start, evaluate): run the package's loop from `start`; evaluate (m, d) -> (m,).
     rival: name of the algorithm here that it stands beside. fewest: points that the package takes at least.
+    calls_lapack: see `bench.fingerprint`.
     """
 
     name: ClassVar[str]
     rival: ClassVar[str]
     Params: ClassVar[type[Any]]
     fewest: ClassVar[int] = 1
+    calls_lapack: ClassVar[bool] = False
 
     @staticmethod
     def search(params: Any, start: Start, evaluate: Any) -> None:
@@ -234,6 +236,8 @@ class Peer:
 
 class GradientPeer(Peer):
     """Base of loops that want derivatives too; their `search` calls `evaluate.differentiate` beside `evaluate`."""
+
+    calls_lapack = True  # for the derivatives of singular values
 
     @staticmethod
     def question(state: PeerState) -> Question | None:

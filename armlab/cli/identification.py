@@ -1,5 +1,6 @@
 """The commands of identification and the studies of it: options only, no logic."""
 
+import json
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -77,11 +78,18 @@ def predict(model: Path, recording: Path, out: Path | None) -> ResultLines:
 def coverage(experiments: int, seed: int, results: Path) -> Iterator[str]:
     """Measure how often 95 % intervals contain the truth.
 
-    Simulates experiments and identifies them. Writes coverage.json.
+    Simulates experiments and identifies them, and compares simulated ends of two algorithms (A12). Writes
+    coverage.json.
     """
-    from armlab.identification.coverage import write_coverage
+    from armlab.common.files import write_texts
+    from armlab.identification.coverage import measure_coverage
+    from bench.statistics.superiority import describe_coverage, superiority_coverage
 
-    return write_coverage(experiments, seed, results)
+    identified = yield from measure_coverage(experiments, seed)
+    effect_sizes = superiority_coverage()
+    yield from describe_coverage(effect_sizes)
+    text = json.dumps({**identified, "superiority": effect_sizes}, indent=2, allow_nan=False) + "\n"
+    yield from map(str, write_texts({"coverage.json": text}, results))
 
 
 @click.command("real-conditioning")

@@ -1,12 +1,11 @@
 """How often 95 % intervals hold the truth: simulated experiments with noise of several colours on both sides.
 
-Each experiment passes the whole chain of filters; `write_coverage` is what `armlab coverage` does.
+Each experiment passes the whole chain of filters; `armlab coverage` writes what `measure_coverage` returns.
 """
 
-import json
-from collections.abc import Iterator
+from collections.abc import Generator
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,6 @@ from scipy.signal import lfilter
 from scipy.stats import norm
 
 from armlab.common.arrays import Array
-from armlab.common.files import write_texts
 from armlab.effects.scene import Scene
 from armlab.identification.components import usual_components
 from armlab.identification.identifier import Identifier
@@ -98,8 +96,8 @@ NOISE_KINDS = {
 }
 
 
-def write_coverage(experiments: int, seed: int, results: Path) -> Iterator[str]:
-    """Runs experiments with each kind of noise and writes `coverage.json`; yields a line for each kind."""
+def measure_coverage(experiments: int, seed: int) -> Generator[str, None, dict[str, Any]]:
+    """Runs experiments with each kind of noise; yields a line for each kind, and returns the numbers."""
     rows = {}
     for number, (name, noise) in enumerate(NOISE_KINDS.items()):
         count = experiments // len(NOISE_KINDS) + (number < experiments % len(NOISE_KINDS))
@@ -112,8 +110,7 @@ def write_coverage(experiments: int, seed: int, results: Path) -> Iterator[str]:
         np.average([row["coverage"] for row in rows.values()], weights=[row["experiments"] for row in rows.values()])
     )
     yield f"all: {100 * total:.1f} % in {experiments} experiments"
-    text = json.dumps({"seed": seed, "coverage": total, "kinds": rows}, indent=2, allow_nan=False) + "\n"
-    yield from map(str, write_texts({"coverage.json": text}, results))
+    return {"seed": seed, "coverage": total, "kinds": rows}
 
 
 def _coverage_row(held: np.ndarray) -> dict[str, float]:

@@ -10,6 +10,7 @@ from functools import lru_cache
 from typing import Annotated, Literal, NamedTuple, Protocol, Self
 
 from pydantic import Field, model_validator
+from threadpoolctl import threadpool_limits
 
 from armlab.common.settings import Settings
 from bench.execute import Failure, Outcome, Trial, load_algorithm, run_batch
@@ -39,8 +40,13 @@ class WorkReport(NamedTuple):
 
 
 def run_work(work: Work, timeout_s: float | None = None) -> WorkReport:
-    """Run trials one after the other; the process dies with a trial that takes longer than `timeout_s`."""
-    return WorkReport([(key, _run_with_time_limit(key, trial, timeout_s)) for key, trial in work], _worker_provenance())
+    """Run trials one after the other; the process dies with a trial that takes longer than `timeout_s`.
+
+    Linear algebra has one thread: more of them round otherwise, and the workers take all cores.
+    """
+    with threadpool_limits(1, user_api="blas"):
+        results = [(key, _run_with_time_limit(key, trial, timeout_s)) for key, trial in work]
+        return WorkReport(results, _worker_provenance())
 
 
 def run_in_worker(work: Work, timeout_s: float | None = None) -> WorkReport:
@@ -86,8 +92,8 @@ def _code_fingerprint(algorithm: str, problem: ProblemSettings) -> str:
 
 def _other_code_message() -> str:
     return (
-        f"OtherCodeError: the worker on {platform.node()} has other code or files, or another release of a package, "
-        "than the process that started the run"
+        f"OtherCodeError: the worker on {platform.node()} has other code or files, another release of a package, or "
+        "(for an algorithm that calls LAPACK) another kernel of it, than the process that started the run"
     )
 
 

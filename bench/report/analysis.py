@@ -10,6 +10,7 @@ import pandas as pd
 from armlab.common.arrays import Array
 from bench.result_sets.result_set import ResultSet, runs_by_algorithm
 from bench.statistics import Summary, is_feasible, quantile, summarise
+from bench.statistics.critical_difference import CriticalDifference, critical_difference
 from bench.statistics.ends import quantile_interval, row_quantiles
 from bench.statistics.pairwise import Duel, duels, log_losses
 from bench.statistics.performance import (
@@ -86,6 +87,11 @@ class Cell:
     def losses(self) -> pd.DataFrame:
         """log10 of the ends, a row a repetition and a column an algorithm, an infeasible one worse than all others."""
         return log_losses(self.trials)
+
+    @cached_property
+    def ranking(self) -> CriticalDifference:
+        """The ranking on this problem, over its repetitions."""
+        return critical_difference(self.losses)
 
     @cached_property
     def all_duels(self) -> list[Duel]:

@@ -3,7 +3,7 @@ its charts.
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -17,13 +17,19 @@ from algorithms.registry import names as registered
 from armlab.common.arrays import Array
 from armlab.common.files import write_whole
 from armlab.common.report.page import render_page
-from armlab.common.report.palette import series_style
+from armlab.common.report.palette import SeriesStyle, series_style
 from bench.report import sections
 from bench.report.analysis import Cell, analyse_cells, share_of_targets_reached
 from bench.report.ranking_chart import draw_critical_difference
 from bench.result_sets.formats import make_folder, read_results
 from bench.result_sets.result_set import ResultSet
-from bench.statistics.critical_difference import block_losses, critical_difference
+from bench.statistics.critical_difference import (
+    CriticalDifference,
+    block_losses,
+    critical_difference,
+    paired_ranking,
+)
+from bench.statistics.ends import place_of_zero
 from bench.statistics.performance import performance_profile
 from bench.store import open_store
 from bench.studies.properties import AlgorithmProperties, measure_isolated, stored_properties
@@ -46,6 +52,7 @@ def _problem_data(cell: Cell) -> dict[str, Any]:
     curves = {name: cell.progress[name].quartiles for name in cell.algorithms}
     return {
         "name": cell.label,
+        "zero": None if (zero := place_of_zero(_shown_values(cell))) is None else float(f"{zero:.4g}"),
         "evaluations": _to_json_numbers(cell.moments),
         "convergence": {name: [_to_json_numbers(part) for part in parts] for name, parts in curves.items()},
         "reached": {
@@ -54,6 +61,12 @@ def _problem_data(cell: Cell) -> dict[str, Any]:
         "ends": {name: _to_json_numbers(cell.ends(name)) for name in cell.algorithms},
         "boxes": {name: _to_json_numbers(_quartiles(cell, name)) for name in cell.algorithms},
     }
+
+
+def _shown_values(cell: Cell) -> Array:
+    """Every value of the charts of a problem."""
+    parts = [cell.ends(name) for name in cell.algorithms]
+    return np.concatenate([*parts, *(cell.progress[name].quartiles.ravel() for name in cell.algorithms)])
 
 
 def _overall_data(cells: Sequence[Cell], algorithms: Sequence[str]) -> dict[str, Any]:
@@ -84,17 +97,19 @@ _SCRIPTS = ("scales.js", "lines.js", "boxes.js", "page.js")
 def report_page(results: ResultSet, cells: Sequence[Cell], facts: Sequence[AlgorithmProperties]) -> str:
     """The page as HTML; facts: properties of the algorithms that took part and are registered here."""
     looks = {name: series_style(index) for index, name in enumerate(results.algorithms)}
-    found = critical_difference(block_losses([cell.losses for cell in cells]))
+    losses = [cell.losses for cell in cells]
+    within, over = paired_ranking(losses), critical_difference(block_losses(losses))
     data = page_data(cells, results.algorithms).replace("<", "\\u003c")  # a label must not end the script
     return render_page(
         __package__,
         "results.html",
         results.name,
         counts=sections.count_sentence(results, cells),
-        headline=sections.headline(cells, found),
+        headline=sections.headline(cells, within, over),
         looks=looks,
-        ranking=sections.ranking_text(found, cells),
-        picture=draw_critical_difference(found, looks),
+        ranking=sections.ranking_text(within, cells),
+        picture=draw_critical_difference(within, looks),
+        over_problems=_over_problems(over, looks) if len(cells) > 1 else None,
         tally=sections.tally_table(cells, results.algorithms) if len(cells) > 1 else None,
         problems=[
             sections.ProblemPart(cell.label, sections.ends_table(cell), sections.duels_table(cell)) for cell in cells
@@ -105,6 +120,11 @@ def report_page(results: ResultSet, cells: Sequence[Cell], facts: Sequence[Algor
         data=Markup(data),
         scripts=Markup("\n".join(_read_asset(name) for name in _SCRIPTS)),
     )
+
+
+def _over_problems(over: CriticalDifference, looks: Mapping[str, SeriesStyle]) -> tuple[str, Markup]:
+    """The ranking over problems: its text and its picture."""
+    return sections.generalisation_text(over), draw_critical_difference(over, looks)
 
 
 def _read_asset(name: str) -> str:

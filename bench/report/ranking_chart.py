@@ -27,7 +27,8 @@ def draw_critical_difference(found: CriticalDifference, looks: Mapping[str, Seri
 def _describe_ranks(found: CriticalDifference) -> str:
     ranks = ", ".join(f"{name} {rank:.2f}" for name, rank in found.ranks.items())
     alike = "; ".join(" and ".join(group) for group in found.groups) or "none"
-    return f"Average ranks: {ranks}. Not told apart: {alike}."
+    bars = "Too few to tell any two apart" if found.has_too_few_blocks else f"Not told apart: {alike}"
+    return f"Average ranks: {ranks}. {bars}."
 
 
 def _draw_axis(count: int, plot: int, height: int) -> Iterator[str]:
@@ -50,7 +51,7 @@ def _draw_dots(found: CriticalDifference, looks: Mapping[str, SeriesStyle], plot
 
 def _draw_bars(found: CriticalDifference, plot: int) -> Iterator[str]:
     rows = {name: row for row, name in enumerate(found.ranks)}
-    for place, group in enumerate(found.groups):
+    for place, group in enumerate(() if found.has_too_few_blocks else found.groups):
         x = _NAME + plot + 22 + place * _BAR_SPACING
         top, bottom = _row_y(rows[group[0]]) - 7, _row_y(rows[group[-1]]) + 7
         yield svg_element("line", x1=x, x2=x, y1=top, y2=bottom, stroke=palette.INK, stroke_width=4)

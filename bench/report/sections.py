@@ -6,8 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 import yaml
 
+from algorithms.registry import BrokenAlgorithmError, UnknownAlgorithmError, load
 from armlab.common.report.page import Table
 from armlab.common.report.wording import count_of
+from bench.fingerprint import calls_lapack
 from bench.report.analysis import Cell
 from bench.result_sets.result_set import ResultSet
 from bench.statistics.critical_difference import ERROR_RATE, CriticalDifference
@@ -139,25 +141,63 @@ def count_sentence(results: ResultSet, cells: Sequence[Cell]) -> str:
     return " ".join([counts, *(f"{gap}." for gap in results.gaps)])
 
 
-def headline(cells: Sequence[Cell], found: CriticalDifference) -> tuple[str, str]:
-    """Who has the best average rank, whom it beats and with whom it ties; then who of the others beats whom."""
-    best, *others = found.ranks
+MAX_NAMED_PROBLEMS = 6  # of which the headline names the winners one by one
+
+
+def headline(cells: Sequence[Cell], within: CriticalDifference, over: CriticalDifference) -> tuple[str, str]:
+    """Who has the best average rank on these problems, whom it beats and with whom it ties; then who beats whom, on
+    each problem where they are few; and what holds for problems of this kind. within: from the paired runs. over: from
+    the medians of the problems.
+    """
+    best, *others = within.ranks
     if not others:
         return f"{best} is the only algorithm: nothing was compared.", ""
-    equal = [name for name in others if np.isclose(found.ranks[name], found.ranks[best])]
+    equal = [name for name in others if np.isclose(within.ranks[name], within.ranks[best])]
     leads = f"{join_words([best, *equal])} share" if equal else f"{best} has"
-    first = f"{leads} the best average rank, {found.ranks[best]:.2f} of {len(found.ranks)}"
-    if found.has_too_few_blocks:
-        return f"{first}; {found.blocks} {_block_name(cells)} are too few to tell any pair apart.", ""
+    first = f"{leads} the best average rank, {within.ranks[best]:.2f} of {len(within.ranks)}"
+    if within.has_too_few_blocks:
+        first = f"{first}; {within.blocks} repetitions are too few to tell any pair apart."
+    else:
+        first = f"{first}: {best if equal else 'it'} {_wins_and_ties(best, within)}."
+    if len(cells) == 1:
+        return first, "" if within.has_too_few_blocks else _rest_sentence(within)
+    parts = [f"On {cell.label}: {_winners_on(cell)}." for cell in cells] if len(cells) <= MAX_NAMED_PROBLEMS else []
+    parts += [] if parts else [_rest_sentence(within)]
+    return first, " ".join([*parts, _generalisation(over)])
+
+
+def _wins_and_ties(best: str, found: CriticalDifference) -> str:
     beaten = _beaten_by(best, found)
-    ties = [name for name in others if name not in beaten]
+    ties = [name for name in found.ranks if name != best and name not in beaten]
     parts = [f"beats {join_words(beaten)}"] if beaten else []
     parts += [f"ties with {join_words(ties)}"] if ties else []
+    return " and ".join(parts)
+
+
+def _winners_on(cell: Cell) -> str:
+    """Who beats whom on one problem."""
+    found = cell.ranking
+    if found.has_too_few_blocks:
+        return f"{found.blocks} repetitions are too few to tell any pair apart"
+    wins = [f"{name} beats {join_words(_beaten_by(name, found))}" for name in found.ranks if _beaten_by(name, found)]
+    return "; ".join(wins) or "no two are told apart"
+
+
+def _rest_sentence(found: CriticalDifference) -> str:
+    """Who of the others beats whom, and how many pairs tie."""
+    others = list(found.ranks)[1:]
     wins = [f"{name} beats {join_words(_beaten_by(name, found))}" for name in others if _beaten_by(name, found)]
     tied = sum(p > ERROR_RATE for p in found.p.values())
-    rest = f" {tied} of {len(found.p)} pairs tie: no difference was shown." if tied else ""
-    first = f"{first}: {best if equal else 'it'} {' and '.join(parts)}."
-    return first, f"{'; '.join(wins)}.{rest}" if wins else rest.strip()
+    rest = f"{tied} of {len(found.p)} pairs tie: no difference was shown." if tied else ""
+    return " ".join(filter(None, [f"{'; '.join(wins)}." if wins else "", rest]))
+
+
+def _generalisation(over: CriticalDifference) -> str:
+    """What the problems say as a sample of others like them."""
+    if over.has_too_few_blocks:
+        return f"As a sample of others like them, {over.blocks} problems are too few to tell any pair apart."
+    best = next(iter(over.ranks))
+    return f"As a sample of others like them: {best} {_wins_and_ties(best, over)}."
 
 
 def _beaten_by(name: str, found: CriticalDifference) -> list[str]:
@@ -172,22 +212,24 @@ def join_words(names: Sequence[str]) -> str:
     return f"{', '.join(others)} and {last}" if others else last
 
 
-def ranking_text(found: CriticalDifference, cells: Sequence[Cell]) -> str:
-    """How the ranks were compared."""
-    text = (
-        f"Average ranks over {found.blocks} {_block_name(cells)}, 1 the best. A bar joins algorithms that cannot be "
-        "told "
-        f"apart: Wilcoxon's signed-rank test of every pair, Holm's correction over all {len(found.p)}, 5 %. "
-        f"Friedman's test that all are equal: p = {found.friedman_p:.2g}."
+def ranking_text(within: CriticalDifference, cells: Sequence[Cell]) -> str:
+    """How the ranks of paired runs were compared."""
+    problems = "" if len(cells) == 1 else f" of {len(cells)} problems"
+    told = "" if len(cells) == 1 else ", on at least one problem and on none the other way round"
+    return (
+        f"Average ranks over the paired repetitions{problems}, 1 the best. A bar joins algorithms that cannot be told "
+        f"apart: Wilcoxon's signed-rank test of every pair{told}, Holm's correction over all {within.tests}, 5 %."
     )
-    if found.has_too_few_blocks:
-        text += f" With so few {_block_name(cells)} no pair could be told apart at all."
-    return text
 
 
-def _block_name(cells: Sequence[Cell]) -> str:
-    """What is ranked: medians of problems, or the repetitions of a single problem."""
-    return "problems" if len(cells) > 1 else "repetitions"
+def generalisation_text(over: CriticalDifference) -> str:
+    """How the ranks of medians over problems were compared."""
+    text = (
+        f"Average ranks of the medians of {over.blocks} problems: what may be expected of others like them. "
+        f"Holm's correction over all {over.tests} pairs, 5 %. Friedman's test that all are equal: "
+        f"p = {over.friedman_p:.2g}."
+    )
+    return f"{text} So few problems cannot tell any pair apart." if over.has_too_few_blocks else text
 
 
 def power_part(cells: Sequence[Cell]) -> TextAndTable:
@@ -216,14 +258,25 @@ def origin_part(results: ResultSet) -> Origin:
     headings = ["", *(f"machine {k}" for k in machines)]
     settings = yaml.safe_load(results.settings)
     text = (
-        f"Seed {settings['seed']}. With the same versions the same configuration gives the same numbers, whatever the "
-        "number of workers."
+        f"Seed {settings['seed']}. With the same versions on the same kind of processor (kernels of BLAS and SIMD "
+        "level as below) the same configuration gives the same numbers, whatever the number of workers. On another one "
+        "the last digits differ"
     )
+    lapack = [label for label, entry in settings["algorithms"].items() if _calls_lapack(entry["name"])]
+    text += f", and the whole path of {join_words(lapack)}, which call LAPACK." if lapack else "."
     steps = (
         f"armlab run {results.name}.yaml\narmlab report {results.name}.yaml\n"
         f"armlab share {results.name}.yaml --as csv --out {results.name}_tables"
     )
     return Origin(text, steps, Table(headings, rows, tuple(machines)), results.settings)
+
+
+def _calls_lapack(name: str) -> bool:
+    """Whether an algorithm calls LAPACK; one that is not registered here may."""
+    try:
+        return calls_lapack(load(name))
+    except (UnknownAlgorithmError, BrokenAlgorithmError):
+        return True
 
 
 def _origin_keys(results: ResultSet) -> list[str]:

@@ -21,7 +21,7 @@ import yaml
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.common.files import write_whole
+from armlab.common.files import all_or_none, write_whole
 from armlab.common.report.printed_table import TABLE_FORMS
 from bench.config import NAME_PATTERN
 from bench.files import file_name
@@ -242,18 +242,17 @@ _IOH_VERSION = "0.3.5"  # of the format
 
 
 def write_iohprofiler(results: ResultSet, folder: Path) -> list[Path]:
-    """Write a result set into a folder; returns the JSON files."""
+    """Write a result set into a folder, all of it or nothing; returns the JSON files."""
     if "dimension" not in results.trials:
         raise InputError(f"the trials of {results.name} have no column `dimension`, which IOHprofiler needs")
     written = []
-    for number, (label, trials, curves) in enumerate(results.cells(), start=1):
-        for algorithm, runs in runs_by_algorithm(trials, curves).items():
-            place = folder / file_name(algorithm)
-            written.append(
-                _write_ioh_problem(
-                    place, number, label, int(trials["dimension"].iloc[0]), algorithm, list(runs.values())
-                )
-            )
+    with all_or_none(folder) as draft:
+        for number, (label, trials, curves) in enumerate(results.cells(), start=1):
+            dimension = int(trials["dimension"].iloc[0])
+            for algorithm, runs in runs_by_algorithm(trials, curves).items():
+                place = draft / file_name(algorithm)
+                path = _write_ioh_problem(place, number, label, dimension, algorithm, list(runs.values()))
+                written.append(folder / path.relative_to(draft))
     return written
 
 

@@ -11,6 +11,7 @@ from scipy.stats import friedmanchisquare, rankdata
 from armlab.common.arrays import Array
 from armlab.common.statistics import adjust_by_holm
 from bench.statistics.pairwise import paired_losses, signed_rank_p
+from bench.statistics.superiority import superiority
 
 Pair = tuple[str, str]
 ERROR_RATE = 0.05
@@ -20,7 +21,7 @@ ERROR_RATE = 0.05
 class CriticalDifference:
     """Average ranks, best first; groups: the longest runs of neighbours of which no two differ significantly.
 
-    p: of every pair, after Holm's correction over all of them. friedman_p: that all are equal, NaN for fewer than three
+    p: of every pair, after Holm's correction over all `tests`. friedman_p: that all are equal, NaN for fewer than three
     algorithms.
     """
 
@@ -29,11 +30,12 @@ class CriticalDifference:
     groups: tuple[tuple[str, ...], ...]
     friedman_p: float
     blocks: int
+    tests: int
 
     @property
     def has_too_few_blocks(self) -> bool:
         """Whether no pair can differ significantly: even the smallest possible p-value is too large."""
-        return len(self.p) * 2.0 ** (1 - self.blocks) > ERROR_RATE
+        return self.tests * 2.0 ** (1 - self.blocks) > ERROR_RATE
 
 
 def critical_difference(losses: pd.DataFrame, rate: float = ERROR_RATE) -> CriticalDifference:
@@ -47,7 +49,34 @@ def critical_difference(losses: pd.DataFrame, rate: float = ERROR_RATE) -> Criti
     raw = np.array([signed_rank_p(*paired_losses(losses, a, b)) for a, b in pairs])
     p = dict(zip(pairs, adjust_by_holm(raw).tolist(), strict=True))
     groups = indistinguishable_groups(list(ranks), p, rate)
-    return CriticalDifference(ranks, p, groups, _friedman_p(complete), len(complete))
+    return CriticalDifference(ranks, p, groups, _friedman_p(complete), len(complete), len(pairs))
+
+
+def paired_ranking(losses: Sequence[pd.DataFrame], rate: float = ERROR_RATE) -> CriticalDifference:
+    """The ranking on these problems alone, from the paired runs within each; losses: of each, as `log_losses` gives.
+
+    Ranks are averaged over all repetitions of all problems. Two algorithms differ where a test tells them apart on a
+    problem and none tells the opposite on another; Holm's correction is over all pairs of all problems. blocks: the
+    least number of complete repetitions of a problem.
+    """
+    blocks = paired_blocks(losses)
+    ranks = average_ranks(blocks)
+    pairs = list(combinations(ranks, 2))
+    paired = [[paired_losses(one, *pair) for pair in pairs] for one in losses]
+    raw = np.array([signed_rank_p(*both) for row in paired for both in row])
+    adjusted = adjust_by_holm(raw).reshape(len(losses), len(pairs))
+    signs = np.array([[np.sign(superiority(*both)[0] - 0.5) for both in row] for row in paired])
+    told = np.where(adjusted <= rate, signs, 0.0)
+    opposed = (told > 0).any(axis=0) & (told < 0).any(axis=0)
+    p = dict(zip(pairs, np.where(opposed, 1.0, adjusted.min(axis=0)).tolist(), strict=True))
+    groups = indistinguishable_groups(list(ranks), p, rate)
+    least = min(len(one.dropna()) for one in losses)
+    return CriticalDifference(ranks, p, groups, _friedman_p(blocks), least, len(raw))
+
+
+def paired_blocks(losses: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """The complete repetitions of all problems, one below the other; only their ranks within a row mean something."""
+    return pd.concat([one.dropna() for one in losses], ignore_index=True)
 
 
 def block_losses(losses: Sequence[pd.DataFrame]) -> pd.DataFrame:

@@ -83,3 +83,11 @@ def percentile_interval(resampled: Array) -> tuple[float, float]:
     """The middle 95 % of resampled figures (m,)."""
     tail = (1.0 - INTERVAL_LEVEL) / 2
     return quantile(resampled, tail), quantile(resampled, 1.0 - tail)
+
+
+def place_of_zero(values: Array) -> float | None:
+    """Where 0 stands on a logarithmic axis: a decade below the least positive value; None where no value is 0."""
+    if not (values == 0).any():
+        return None
+    positive = values[(values > 0) & np.isfinite(values)]
+    return float(positive.min()) / 10 if len(positive) else 1.0

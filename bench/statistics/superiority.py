@@ -63,20 +63,26 @@ COVERAGE_REPETITIONS = (12, 15, 30)
 COVERAGE_SIMULATIONS = 4000
 
 
-def superiority_coverage() -> dict[str, dict[str, dict[str, float]]]:
+def superiority_coverage(simulations: int = COVERAGE_SIMULATIONS) -> dict[str, dict[str, dict[str, float]]]:
     """By distribution of the ends, repetitions and true A12: the share of simulated intervals that hold the truth."""
     return {
         name: {
-            str(n): {f"{effect:g}": _coverage(name, draw, n, effect) for effect in COVERAGE_EFFECTS}
+            str(n): {f"{effect:g}": _coverage(name, n, effect, simulations) for effect in COVERAGE_EFFECTS}
             for n in COVERAGE_REPETITIONS
         }
-        for name, draw in _DISTRIBUTIONS.items()
+        for name in _DISTRIBUTIONS
     }
 
 
-def _coverage(name: str, draw: "_Draw", n: int, effect: float) -> float:
+def describe_coverage(found: dict[str, dict[str, dict[str, float]]]) -> list[str]:
+    """The least coverage of each distribution, in words."""
+    least = {name: min(min(shares.values()) for shares in by.values()) for name, by in found.items()}
+    return [f"A12, {name}: at least {100 * share:.1f} % of the intervals" for name, share in least.items()]
+
+
+def _coverage(name: str, n: int, effect: float, simulations: int) -> float:
     rng = named_generator("coverage of A12", name, n, str(effect))
-    subjects, rivals = draw(rng, (COVERAGE_SIMULATIONS, n), effect)
+    subjects, rivals = _DISTRIBUTIONS[name](rng, (simulations, n), effect)
     found = (superiority(subject, rival) for subject, rival in zip(subjects, rivals, strict=True))
     return float(np.mean([low <= effect <= high for _, low, high in found]))
 

@@ -42,7 +42,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         content = yaml.safe_load((ROOT / "configs" / f"{name}.yaml").read_text()) | SMALLER.get(name, {})
         if name == "ranking":
             content["problem"] = [
-                p for p in content["problem"] if p["label"] in ("default 5 s SI free", "default 2 s SI free")
+                p for p in content["problem"] if p["label"] in ("default 10 s SI free", "default 2 s SI free")
             ]
         (configs / f"{name}.yaml").write_text(yaml.safe_dump(content))
     options = RunOptions(home / "runs.sqlite", home / "results", workers=1)
@@ -63,7 +63,7 @@ def test_every_table_and_figure_of_the_paper_is_written(folder: Path) -> None:
 
 def test_every_claim_has_a_verdict_and_the_counts_add_up(folder: Path) -> None:
     text = (folder / "replication.md").read_text()
-    verdicts = re.findall(rf"\| \*\*({'|'.join(VERDICTS)})\*\* \|", text)
+    verdicts = re.findall(rf"\| \*\*({'|'.join(VERDICTS)})\*\* [|(]", text)
     total = next(line for line in text.splitlines() if line.startswith("| **all**"))
     counts = [int(cell) for cell in total.split("|")[2:-1]]
     assert counts == [*(verdicts.count(verdict) for verdict in VERDICTS), len(verdicts)]
@@ -102,7 +102,11 @@ def test_predicted_standard_deviations_are_of_the_size_of_the_seen_ones(folder: 
 
 def test_the_ranking_leaves_out_the_choice_that_no_algorithm_can_meet(folder: Path) -> None:
     duels = pd.read_csv(folder / "ranking_duels.csv", dtype=str)
-    assert duels["feasible"].to_list().count("0%") == 1
+    assert duels.groupby("reading")["feasible"].agg(list).map(lambda shares: shares.count("0%")).to_dict() == {
+        "ours": 1,
+        "text": 1,
+        "program": 1,
+    }
     assert "rank (1: best) in 3 repetitions" in (folder / "ranking.svg").read_text()
 
 

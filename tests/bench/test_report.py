@@ -17,7 +17,7 @@ from bench.report.ranking_chart import draw_critical_difference
 from bench.report.sections import ends_table, format_number, headline, tally_table
 from bench.result_sets.formats import read_results, share_results
 from bench.result_sets.result_set import ResultSet, TableOfCurves
-from bench.statistics.critical_difference import block_losses, critical_difference
+from bench.statistics.critical_difference import block_losses, critical_difference, paired_ranking
 from bench.statistics.performance import Run
 
 
@@ -119,8 +119,29 @@ def test_the_data_of_the_charts_are_those_of_the_results(results: ResultSet) -> 
     assert sum(shares[0] for shares in data["overall"]["profile"].values()) == pytest.approx(1.0)
 
 
-def test_a_page_of_two_problems_says_that_they_tell_nothing_apart(results: ResultSet) -> None:
-    assert "2 problems are too few to tell any pair apart." in report_page(results, analyse_cells(results), [])
+def test_a_page_of_two_problems_names_the_winners_on_each_and_says_that_two_stand_for_no_others(
+    results: ResultSet,
+) -> None:
+    page = report_page(results, analyse_cells(results), [])
+    assert "On sphere: " in page
+    assert "On rastrigin: " in page
+    assert "2 problems are too few to tell any pair apart." in page
+
+
+def test_two_algorithms_on_one_problem_have_a_winner(cell: Cell) -> None:
+    base = np.random.default_rng(0).normal(size=30)
+    found = paired_ranking([pd.DataFrame({"a": base, "b": base + 0.1})])
+    first, second = headline([cell], found, found)
+    assert first == "a has the best average rank, 1.00 of 2: it beats b."
+    assert second == ""
+
+
+def test_algorithms_that_win_on_different_problems_are_not_told_apart_over_both() -> None:
+    base = np.random.default_rng(0).normal(size=20)
+    here, there = pd.DataFrame({"a": base, "b": base + 1}), pd.DataFrame({"a": base + 1, "b": base})
+    assert paired_ranking([here, there]).p["a", "b"] == 1.0
+    assert paired_ranking([here, here]).p["a", "b"] < 1e-4
+    assert paired_ranking([here, here]).tests == 2
 
 
 def test_one_problem_alone_is_ranked_by_its_repetitions(results: ResultSet) -> None:
@@ -145,7 +166,8 @@ def test_the_headline_says_who_beats_whom_and_who_ties(cell: Cell) -> None:
     rng = np.random.default_rng(0)
     base = rng.normal(size=20)
     losses = pd.DataFrame({"b": base + 5, "a": base, "c": base + 5 + rng.normal(scale=0.1, size=20)})
-    first, second = headline([cell], critical_difference(losses))
+    found = paired_ranking([losses])
+    first, second = headline([cell], found, found)
     assert re.fullmatch(r"a has the best average rank, 1\.00 of 3: it beats (b and c|c and b)\.", first)
     assert second == "1 of 3 pairs tie: no difference was shown."
 
@@ -153,10 +175,12 @@ def test_the_headline_says_who_beats_whom_and_who_ties(cell: Cell) -> None:
 def test_the_headline_names_all_that_share_the_best_rank(cell: Cell) -> None:
     base = np.arange(20.0)
     turns = np.where(np.arange(20) % 2, 0.5, -0.5)
-    first, second = headline([cell], critical_difference(pd.DataFrame({"a": base, "b": base + turns, "c": base + 5})))
+    found = paired_ranking([pd.DataFrame({"a": base, "b": base + turns, "c": base + 5})])
+    first, second = headline([cell], found, found)
     assert first == "a and b share the best average rank, 1.50 of 3: a beats c and ties with b."
     assert second == "b beats c. 1 of 3 pairs tie: no difference was shown."
-    few, _ = headline([cell], critical_difference(pd.DataFrame({"a": [1.0, 2.0], "b": [2.0, 1.0]})))
+    few_runs = paired_ranking([pd.DataFrame({"a": [1.0, 2.0], "b": [2.0, 1.0]})])
+    few, _ = headline([cell], few_runs, few_runs)
     assert few.startswith("a and b share the best average rank, 1.50 of 2; 2 ")
 
 

@@ -1,6 +1,7 @@
 """Result sets: collected from the store, written as tidy tables and for IOHprofiler, and read back unchanged."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -215,11 +216,15 @@ def test_names_that_look_like_numbers_or_gaps_stay_names(small_run: Ran, tmp_pat
 
 
 def test_labels_that_differ_have_files_that_differ() -> None:
-    labels = ["spso", "a b", "a_b", "a/b", "..", "l-shade"]
+    labels = ["spso", "Spso", "a b", "a_b", "a/b", "..", "l-shade", ".5-inertia", "CON", "con", "nul.txt", "-x", "算法"]
+    labels += ["a" * 300, "a" * 299 + "b", "trailing."]
     names = [file_name(label) for label in labels]
     assert names[0] == "spso"
-    assert len(set(names)) == len(labels)
-    assert not any("/" in name or not name.strip(".") for name in names)
+    assert len({name.lower() for name in names}) == len(labels)
+    for name in names:
+        assert re.fullmatch(r"[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9])?", name)
+        assert len(name) <= 80
+        assert name.partition(".")[0].lower() not in ("con", "nul")
 
 
 def test_origins_that_are_no_list_of_machines_are_refused(small_run: Ran, tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from bench.statistics.performance import (
     targets_between,
 )
 from bench.statistics.power import powers, signed_rank_power, smallest_detectable_effect
-from bench.statistics.superiority import superiority
+from bench.statistics.superiority import superiority, superiority_coverage
 
 # Demšar 2006 (JMLR 7, 1), table 6: AUC of four variants of C4.5 on 14 data sets. The ranks printed there tell the two
 # 0.975 of the last row but one apart, which agree to the printed digits.
@@ -209,3 +209,23 @@ def test_a_run_that_finds_nothing_feasible_has_an_area_of_one_and_a_perfect_one_
     at_once = Run(np.array([1.0, 20.0]), np.array([1.0, 1.0]))
     assert area_under_curve(never, 1.0, 10.0, 20) == 1.0
     assert area_under_curve(at_once, 1.0, 10.0, 20) == pytest.approx(1 / 20)
+
+
+def test_the_interval_of_superiority_holds_near_one_half_and_near_one() -> None:
+    for name, by_repetitions in superiority_coverage(simulations=800).items():
+        for repetitions, by_effect in by_repetitions.items():
+            for effect, share in by_effect.items():
+                assert share >= 0.93 - 2 * 0.009, (name, repetitions, effect)  # two standard errors of the simulation
+
+
+def test_an_interval_of_superiority_has_a_width_and_one_end_where_all_pairs_agree() -> None:
+    middle, low, high = superiority(np.zeros(12), np.arange(1.0, 13.0))
+    assert (middle, high) == (1.0, 1.0)
+    assert 0.6 < low < 0.9
+    assert superiority(np.ones(12), np.zeros(12)) == (0.0, 0.0, pytest.approx(1 - low))
+    assert superiority(np.zeros(5), np.zeros(5))[0] == 0.5
+
+
+def test_zero_is_within_every_factor_of_zero_and_nothing_else_is() -> None:
+    profile = performance_profile(pd.DataFrame([{"a": 0.0, "b": 1e-9, "c": np.inf}]), np.array([1.0, 10.0]))
+    assert profile.to_numpy().tolist() == [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]

@@ -78,10 +78,10 @@ def test_convergence_averages_the_feasible_ends_of_each_iteration(small: Path) -
             store.add([(entry.key, Outcome(1.0, 0.0, 1.0, 10, 0.1, np.zeros(3), curve))], "{}")
         table = convergence_table(entries, store)
     assert as_csv(table) == (
-        "algorithm,iteration,evaluations,best_so_far,best_so_far_feasible_share,"
-        "present_best,present_best_feasible_share\n"
-        "de,0,5,9,0.5,9,0.5\n"
-        "de,1,10,3,1,8,0.5\n"
+        "algorithm,iteration,evaluations,median_best_so_far,median_present_best,"
+        "best_so_far,best_so_far_feasible_share,present_best,present_best_feasible_share\n"
+        "de,0,5,inf,inf,9,0.5,9,0.5\n"
+        "de,1,10,3,inf,3,1,8,0.5\n"
     )
 
 
@@ -114,6 +114,8 @@ def test_convergence_can_be_drawn_where_nothing_is_feasible_at_first() -> None:
         {
             "algorithm": "de",
             "iteration": [0, 1, 2],
+            "median_best_so_far": [np.inf, np.inf, 20.0],
+            "median_present_best": [np.inf, np.inf, 20.0],
             "best_so_far": [np.nan, 30.0, 20.0],
             "present_best": [np.nan, 30.0, 20.0],
         }
@@ -144,7 +146,7 @@ def test_the_figure_of_ends_says_what_is_infeasible_and_names_every_algorithm() 
 def test_the_figure_of_ranks_orders_by_average_rank_and_says_when_nothing_can_be_told() -> None:
     text = draw_ranking(_comparison(3))["svg"].decode()
     assert text.index("<!-- sqp -->") < text.index("<!-- DE -->") < text.index("<!-- MuPSO -->")
-    assert "in 3 problems, too few to tell any two apart" in text
+    assert "in 21 repetitions of 3 problems" in text
     many = draw_ranking(_comparison(12))["svg"].decode()
     assert "<!-- rank (1: best) in 12 problems -->" in many
     assert "repetitions" in draw_ranking(_comparison(1))["svg"].decode()

@@ -3,9 +3,7 @@
 function drawBoxes(figure, problem, looks) {
   const feasible = looks.flatMap((look) => problem.ends[look.name]).filter((value) => value !== null);
   const all = feasible.length ? feasible : [1, 10];
-  const low = Math.min(...all) * 0.95;
-  const high = Math.max(...all) * 1.05;
-  const x = { low, high, logarithmic: low > 0, label: "value at the end" };
+  const x = { ...spanOf(all, problem.zero), label: "value at the end" };
   const y = { low: 0, high: Math.max(looks.length, 1), ticks: [], logarithmic: false, height: 34 * looks.length + 60 };
   const chart = frame(figure, "Ends of all repetitions", `Box plots of ${problem.name}; the table below has the figures`, x, y);
   looks.forEach((look, row) => drawRow(chart, problem, look, looks.length - row - 0.5));

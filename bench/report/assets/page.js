@@ -32,8 +32,7 @@ function drawConvergence(problem) {
   });
   const known = lines.flatMap((line) => [...line.low, ...line.values, ...line.high]).filter((value) => value !== null);
   const x = { low: xs[0], high: xs[xs.length - 1], logarithmic: true, label: "evaluations" };
-  const low = Math.min(...known);
-  const y = { low: known.length ? low * 0.95 : 1, high: known.length ? Math.max(...known) * 1.05 : 10, logarithmic: !(low <= 0) };
+  const y = spanOf(known.length ? known : [1, 10], problem.zero);
   const words = `Convergence on ${problem.name}; the table below has the ends`;
   drawLines(figureOf("convergence"), { title: "Median of the best so far", words, xs, series: lines, x, y });
 }

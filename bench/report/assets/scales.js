@@ -1,8 +1,13 @@
 "use strict";
 // Axes: where a value lies, which values have a tick, how a number is written.
 
-function scale(low, high, from, to, logarithmic) {
-  const bend = logarithmic ? Math.log10 : (value) => value;
+// The span of values on a logarithmic axis; zero: where 0 stands, a decade below the least positive value, or null.
+function spanOf(values, zero) {
+  return { low: zero === null ? Math.min(...values) * 0.95 : zero, high: Math.max(...values, zero) * 1.05, logarithmic: true, zero };
+}
+
+function scale({ low, high, logarithmic, zero }, from, to) {
+  const bend = logarithmic ? (value) => Math.log10(value === 0 ? zero : value) : (value) => value;
   const span = bend(high) - bend(low) || 1;
   return (value) => from + ((bend(value) - bend(low)) / span) * (to - from);
 }
@@ -16,7 +21,8 @@ function even(low, high) {
   return found;
 }
 
-function ticks(low, high, logarithmic) {
+function ticks({ low, high, logarithmic, zero }) {
+  if (zero) return [0, ...ticks({ low: zero * 10, high, logarithmic })];
   if (!logarithmic) return even(low, high);
   const found = (digits) => {
     const values = [];
@@ -57,13 +63,13 @@ function frame(figure, title, words, x, y) {
   const attributes = { width, height, viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": words, tabindex: 0 };
   const svg = make("svg", attributes);
   figure.append(caption, svg);
-  const toX = scale(x.low, x.high, box.left, box.right, x.logarithmic);
-  const toY = scale(y.low, y.high, box.bottom, box.top, y.logarithmic);
-  for (const value of y.ticks || ticks(y.low, y.high, y.logarithmic)) {
+  const toX = scale(x, box.left, box.right);
+  const toY = scale(y, box.bottom, box.top);
+  for (const value of y.ticks || ticks(y)) {
     make("line", { class: "grid", x1: box.left, x2: box.right, y1: toY(value), y2: toY(value) }, svg);
     make("text", { x: box.left - 6, y: toY(value) + 4, "text-anchor": "end" }, svg, written(value));
   }
-  for (const value of x.ticks || ticks(x.low, x.high, x.logarithmic)) {
+  for (const value of x.ticks || ticks(x)) {
     make("line", { class: "grid", x1: toX(value), x2: toX(value), y1: box.top, y2: box.bottom }, svg);
     make("text", { x: toX(value), y: box.bottom + 16, "text-anchor": "middle" }, svg, written(value));
   }

@@ -11,7 +11,7 @@ from bench.studies.mutations import MutationHistory
 from bench.studies.paper.identification import BestRun, SimulatedIdentification
 from bench.studies.paper.literal import READINGS, Identifiability, Reading, identifiability, literal_matrix
 from bench.studies.paper.published import PublishedReading
-from bench.studies.paper.ranking import Standing
+from bench.studies.paper.ranking import OURS, Standing
 from bench.tables import summary_table, times_table
 
 Verdict = Literal["reproduced", "not reproduced", "cannot be checked"]
@@ -23,7 +23,8 @@ PRINTED_TOLERANCE = 0.10
 class Claim:
     """place: in the paper. says: its statement. ours: our number. why: the reason of the verdict.
 
-    If a claim cannot be checked, `why` names the missing datum.
+    If a claim cannot be checked, `why` names the missing datum. alone: the verdict by our readings of the algorithms
+    alone, where it is another one.
     """
 
     place: str
@@ -31,6 +32,7 @@ class Claim:
     ours: str
     verdict: Verdict
     why: str
+    alone: Verdict | None = None
 
 
 def verdict_if(condition: bool) -> Verdict:
@@ -51,6 +53,7 @@ def percent_change(new: float, old: float) -> float:
 class Evidence:
     """frames: tidy outcomes by experiment. deviations, differences: from Tables 1 and 2.
 
+    rankings: by reading of the algorithms. default: the label of Table 3's problem among the conventions.
     mutation_histories: MuPSO's runs of Table 3 by the reading of eq. 6. readings: the paper's dynamics as printed.
     """
 
@@ -58,12 +61,22 @@ class Evidence:
     frames: Mapping[str, pd.DataFrame]
     deviations: list[str]
     differences: list[str]
-    ranking: list[Standing]
+    rankings: Mapping[str, list[Standing]]
+    default: str
     mutation_histories: Mapping[str, list[MutationHistory]]
     best: BestRun
     found: SimulatedIdentification
     published: list[PublishedReading]
     readings: list[tuple[Reading, Identifiability]]
+
+    @property
+    def ranking(self) -> list[Standing]:
+        """The standings by our readings of the algorithms."""
+        return self.rankings[OURS]
+
+    def default_standing(self, reading: str) -> Standing:
+        """The standing of a reading under the default conventions, those of Table 3."""
+        return next(standing for standing in self.rankings[reading] if standing.problem == self.default)
 
     def column(self, experiment: str, statistic: str) -> dict[Any, float]:
         """A statistic of the ends or the seconds of an experiment, by algorithm, or by (swarm size, algorithm)."""

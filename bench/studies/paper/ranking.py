@@ -11,6 +11,21 @@ from bench.statistics import is_feasible, quantile
 from bench.statistics.pairwise import Duel, duels_against_all
 
 SUBJECT = "mupso"
+OURS = "ours"
+READINGS = {OURS: "as here", "text": "the sources' text as printed", "program": "their authors' programs"}
+"""Readings of the algorithms; one that an algorithm lacks is that of here. No program of MuPSO is published."""
+
+
+def frames_by_reading(frame: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """By reading, the rows of each algorithm under its own name; a label is NAME, or NAME and the reading."""
+    labels = dict.fromkeys(map(str, frame["algorithm"]))
+    names = [label for label in labels if label.rpartition(" ")[2] not in READINGS]
+    frames = {}
+    for reading in READINGS:
+        chosen = {f"{name} {reading}" if f"{name} {reading}" in labels else name: name for name in names}
+        rows = frame[frame["algorithm"].isin(list(chosen))]
+        frames[reading] = rows.assign(algorithm=rows["algorithm"].map(chosen)).reset_index(drop=True)
+    return frames
 
 
 @dataclass(frozen=True)
@@ -26,6 +41,7 @@ class Standing:
     medians: dict[str, float]
     minima: dict[str, float]
     averages: dict[str, float]
+    deviations: dict[str, float]
     duels: list[Duel]
     best_known: float | None
 
@@ -62,9 +78,17 @@ def _make_standing(problem: str, rows: pd.DataFrame, best_known: float | None) -
         {label: quantile(group["end"].to_numpy(), 0.5) for label, group in groups.items()},
         {label: float(group["good"].min()) for label, group in groups.items()},
         {label: float(group["good"].mean()) for label, group in groups.items()},
+        {label: float(group["good"].std()) for label, group in groups.items()},
         duels_against_all(rows, SUBJECT),
         best_known,
     )
+
+
+def count_duels(found: list[Standing]) -> tuple[int, int, int]:
+    """In how many duels of the usable conventions MuPSO is better, in how many worse, and of how many."""
+    usable = [standing for standing in found if standing.usable]
+    better, worse = (sum(standing.count(outcome) for standing in usable) for outcome in ("better", "worse"))
+    return better, worse, sum(len(standing.duels) for standing in usable)
 
 
 def ranking_table(found: list[Standing]) -> pd.DataFrame:

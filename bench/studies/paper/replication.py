@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from armlab.common.errors import InputError
 from armlab.common.files import write_whole
 from armlab.common.settings import Settings, settings_to_yaml
 from bench.printed import read_printed
@@ -16,7 +17,7 @@ from bench.studies.mutations import MutationHistory, replay_mutations
 from bench.studies.paper.claims import Evidence, literal_readings
 from bench.studies.paper.identification import BestRun, find_best_run, simulate_identification
 from bench.studies.paper.published import published_readings
-from bench.studies.paper.ranking import SUBJECT, ranking_table, standings
+from bench.studies.paper.ranking import OURS, SUBJECT, frames_by_reading, ranking_table, standings
 from bench.studies.paper.settings import (
     Figure4Settings,
     Table1Settings,
@@ -89,13 +90,26 @@ def _gather_evidence(
         frames=frames,
         deviations=table1_deviations(items.table1.arm, paper),
         differences=table2_differences(loaded[items.table2.experiment].entries, paper),
-        ranking=standings(frames["ranking"], best_known_values(loaded["ranking"].entries, records)),
+        rankings={
+            reading: standings(frame, best_known_values(loaded["ranking"].entries, records))
+            for reading, frame in frames_by_reading(frames["ranking"]).items()
+        },
+        default=_default_label(loaded),
         mutation_histories=_replay_subject(loaded["table3"], options.workers),
         best=best,
         found=simulate_identification(items.table4, best),
         published=published_readings(paper.optimum),
         readings=literal_readings(paper),
     )
+
+
+def _default_label(loaded: Mapping[str, LoadedExperiment]) -> str:
+    """The label of Table 3's problem among the conventions of the ranking."""
+    wanted = loaded["table3"].entries[0].trial.problem
+    labels = [entry.problem for entry in loaded["ranking"].entries.first_entries() if entry.trial.problem == wanted]
+    if not labels:
+        raise InputError("the ranking should have the problem of Table 3 among its conventions")
+    return labels[0]
 
 
 def _read_outcomes(
@@ -119,7 +133,7 @@ def _make_files(
 
     known = best_known_values(loaded["table3"].entries, records)
     usable = [standing.problem for standing in evidence.ranking if standing.usable]
-    ranking = evidence.frames["ranking"]
+    ranking = frames_by_reading(evidence.frames["ranking"])[OURS]
     figures = {
         "table3": draw_ends(evidence.frames["table3"], known),
         "ranking": draw_ranking(ranking[ranking["problem"].isin(usable)]),
@@ -131,7 +145,12 @@ def _make_files(
         **make_table2(items.table2, loaded[items.table2.experiment].entries, evidence.paper),
         **make_table4(items.table4, evidence.best, evidence.found, evidence.paper),
         **{f"{name}.{suffix}": image for name, images in figures.items() for suffix, image in images.items()},
-        "ranking_duels.csv": as_csv(ranking_table(evidence.ranking)),
+        "ranking_duels.csv": as_csv(
+            pd.concat(
+                [ranking_table(found).assign(reading=reading) for reading, found in evidence.rankings.items()],
+                ignore_index=True,
+            )
+        ),
     }
 
 
