@@ -24,15 +24,13 @@ from bench.statistics.critical_difference import (
 from bench.statistics.ends import place_of_zero
 from bench.statistics.pairwise import log_losses
 from bench.tables import GROUP_COLUMNS, summary_table
+from bench.value_names import CONDITION_NUMBER
 
 _TICK_MULTIPLES = (1, 1.2, 1.4, 1.6, 1.8, 2, 2.5, 3, 4, 5, 7)
 
 
 _ROW_HEIGHT = 0.34  # inches
 _SPREAD = 0.28  # of the dots of one row about its middle, in rows
-
-
-CONDITION_NUMBER = "condition number (-)"
 
 
 def draw_ends(

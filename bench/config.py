@@ -92,7 +92,8 @@ class Experiment(Settings):
 
     iterations: budget of swarm_size * (iterations + 1) evaluations, the first population included; or evaluations: the
     budget itself. derivative_price: evaluations that a point with its derivatives counts for; the dimension plus one,
-    as by forward differences, if left out. output: the result files beside the table. printed: show the paper's Table 3
+    as by forward differences, if left out. output: the result files beside the table; a key with several values gives
+    a figure against them without further ado. printed: show the paper's Table 3
     beside ours. executor: where the trials run. trial_timeout_s: a trial that takes longer is ended. The last two
     change no outcome.
     """
@@ -111,7 +112,7 @@ class Experiment(Settings):
     seed: Annotated[int, Field(ge=0)]
     bounds: Literal["clip", "reflect", "wrap"] = "clip"
     derivative_price: PositiveInt | None = None
-    output: Literal["table", "convergence", "swarm_sizes", "rivals"] = "table"
+    output: Literal["table", "convergence", "rivals"] = "table"
     printed: bool = False
     executor: ExecutorSettings | None = None
     trial_timeout_s: Annotated[float, Field(gt=0, le=10**9)] | None = None
@@ -140,11 +141,8 @@ class Experiment(Settings):
 
     @model_validator(mode="after")
     def _fits_output(self) -> Self:
-        sweeps = len(self.problem) > 1 or len(self.iterations or self.evaluations or ()) > 1
-        if self.output in ("convergence", "swarm_sizes") and sweeps:
-            raise ValueError(f"output '{self.output}' should have one problem and one budget")
-        if self.output == "convergence" and len(self.swarm_size) > 1:
-            raise ValueError("output 'convergence' should have one 'swarm_size'")
+        if self.output == "convergence" and len(self.swarm_size) * len(self.iterations or self.evaluations or ()) > 1:
+            raise ValueError("output 'convergence' should have one 'swarm_size' and one budget")
         return self
 
     def budgets(self, swarm_size: int) -> tuple[int, ...]:

@@ -110,8 +110,11 @@ def mark_zero(axes: Axes, place: float | None, *, upright: bool = False) -> None
 _SWARM_SIZE_LABEL = "swarm size (particles)"
 
 
-def draw_cost(table: pd.DataFrame) -> dict[str, bytes]:
-    """Median with quartiles, and minimum, of the repetitions, from a summary table; PNG and SVG bytes."""
+def draw_cost(table: pd.DataFrame, value: str) -> dict[str, bytes]:
+    """Median with quartiles, and minimum, of the repetitions, from a summary table; PNG and SVG bytes.
+
+    value: what the problem's value is.
+    """
 
     def draw(axes: Sequence[Axes]) -> None:
         for index, (label, rows) in enumerate(table.groupby("algorithm", sort=False)):
@@ -121,7 +124,7 @@ def draw_cost(table: pd.DataFrame) -> dict[str, bytes]:
             quartiles = rows["lower_quartile"], rows["upper_quartile"]
             axes[0].fill_between(sizes, *quartiles, color=drawn.color, alpha=0.15, linewidth=0)
             axes[0].plot(sizes, rows["minimum"], label=f"{name}, minimum", color=drawn.color, linestyle=":")
-        axes[0].set(xlabel=_SWARM_SIZE_LABEL, ylabel="condition number of the best trajectory (-)")
+        axes[0].set(xlabel=_SWARM_SIZE_LABEL, ylabel=f"{value}, best of a run")
 
     return render_panels(1, draw)
 

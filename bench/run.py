@@ -88,13 +88,23 @@ def run_experiment(path: Path, options: RunOptions, bar: ProgressBar) -> list[Pa
 
 
 def report_run(path: Path, options: RunOptions, bar: ProgressBar) -> ResultLines:
-    """Run a configuration and tell the written files; the document has the rows of the tables among them."""
+    """Run a configuration; tells the written files, the table and who beats whom.
+
+    The document has the rows of the tables among the files.
+    """
+    failed: TrialsFailedError | None = None
     try:
         written = run_experiment(path, options, bar)
     except TrialsFailedError as error:
-        yield from map(str, error.written)
-        raise
+        failed, written = error, list(error.written)
     yield from map(str, written)
+    from bench.tables import tidy_frame
+    from bench.terminal import describe_frame
+
+    with open_store(options.store) as store:
+        yield from describe_frame(tidy_frame(load_experiment(path).entries, store))
+    if failed is not None:
+        raise failed
     from pandas import read_csv
 
     tables = {file.name: read_csv(file).to_dict("records") for file in written if file.suffix == ".csv"}

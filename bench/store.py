@@ -6,7 +6,7 @@ import sqlite3
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import fields
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -242,23 +242,53 @@ def salvage(damaged: Path, out: Path) -> int:
         raise InputError(f"there is no run store {damaged}")
     if out.exists():
         raise InputError(f"{out} exists already: name a new file with --out")
-    with closing(sqlite3.connect(f"{damaged.resolve().as_uri()}?mode=ro", uri=True)) as connection:
-        connection.execute("PRAGMA writable_schema = ON")  # else SQLite reads nothing of a file that is too short
-        found = _read_outcomes(RunStore(connection, damaged))
+    with _open_to_read(damaged) as source:
+        source._connection.execute(
+            "PRAGMA writable_schema = ON"
+        )  # else SQLite reads nothing of a file that is too short
+        found = _read_outcomes(source)
         first = next(found, None)
         if first is None:
             raise InputError(f"nothing of {damaged} can be read: it is no run store, or its beginning is damaged")
-        return _write_outcomes([first], found, out)
+        with open_store(out) as store:
+            return _write_outcomes(chain([first], found), store)
 
 
-def _write_outcomes(piece: list[StoredOutcome], found: Iterator[StoredOutcome], out: Path) -> int:
+def copy_outcomes(part: Path, store: RunStore) -> int:
+    """Copy the outcomes of another store that this one lacks, and why trials without one failed; returns their number.
+
+    Raises InputError for a file that is no run store.
+    """
+    with _open_to_read(part) as source, _errors_in_one_line(part):
+        keys = source.keys("")
+        count = _write_outcomes(
+            ((key, source.get(key), source.origins([key])[0]) for key in keys if not store.has(key)), store
+        )
+        with suppress(sqlite3.OperationalError):  # a store of an older release has no such table
+            failed = source._connection.execute("SELECT key, reason FROM failures").fetchall()
+            store.note_failures([(key, reason) for key, reason in failed if not store.has(key)])
+    return count
+
+
+def store_origins(path: Path) -> list[str]:
+    """The provenance of all outcomes in a store; raises InputError for a file that is no run store."""
+    with _open_to_read(path) as source, _errors_in_one_line(path):
+        return [facts for (facts,) in source._connection.execute("SELECT facts FROM provenance").fetchall()]
+
+
+@contextmanager
+def _open_to_read(path: Path) -> Iterator[RunStore]:
+    """A store that is not changed."""
+    with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as connection:
+        yield RunStore(connection, path)
+
+
+def _write_outcomes(found: Iterator[StoredOutcome], store: RunStore) -> int:
     count = 0
-    with open_store(out) as store:
-        while piece:
-            for origin in dict.fromkeys(origin for _, _, origin in piece):
-                store.add([(key, outcome) for key, outcome, its in piece if its == origin], origin)
-            count += len(piece)
-            piece = list(islice(found, _OUTCOMES_PER_TRANSACTION))
+    while piece := list(islice(found, _OUTCOMES_PER_TRANSACTION)):
+        for origin in dict.fromkeys(origin for _, _, origin in piece):
+            store.add([(key, outcome) for key, outcome, its in piece if its == origin], origin)
+        count += len(piece)
     return count
 
 

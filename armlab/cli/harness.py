@@ -243,7 +243,7 @@ def report(results: Path, store: Path, out: Path | None) -> ResultLines:
     """
     from bench.report.page import write_report
 
-    return written_files([write_report(results, store, out)])
+    return write_report(results, store, out)
 
 
 @click.command()
@@ -349,6 +349,22 @@ def salvage(damaged: Path, out: Path) -> ResultLines:
     count = save(damaged, out)
     yield f"{count} outcomes of {damaged} are in {out}"
     return {"outcomes": count, "files": [out]}
+
+
+@click.command()
+@click.argument("parts", type=_PATH, nargs=-1, required=True)
+@click.option("--out", type=OutputPath(), required=True, help="File of the new store, or the new folder.")
+@click.option("--any-versions", is_flag=True, help="Join parts of different versions or kinds of processor, too.")
+@prints_result
+def merge(parts: tuple[Path, ...], out: Path, any_versions: bool) -> ResultLines:
+    """Join PARTS of results into one.
+
+    PARTS: run stores of several machines, or folders that `share` wrote as tables. A trial that several parts have
+    counts once.
+    """
+    from bench.result_sets.join import join_parts
+
+    return join_parts(parts, out, any_versions)
 
 
 @click.command()

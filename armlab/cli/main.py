@@ -89,6 +89,7 @@ _GROUPS = {
     "Maintenance": {
         "doctor": "armlab.cli.maintenance:doctor",
         "salvage": "armlab.cli.harness:salvage",
+        "merge": "armlab.cli.harness:merge",
         "speed": "armlab.cli.maintenance:speed",
         "scale": "armlab.cli.maintenance:scale",
         "regression": "armlab.cli.maintenance:regression",

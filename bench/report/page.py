@@ -15,6 +15,7 @@ from markupsafe import Markup
 
 from algorithms.registry import names as registered
 from armlab.common.arrays import Array
+from armlab.common.documents import ResultLines, written_files
 from armlab.common.files import write_whole
 from armlab.common.report.page import render_page
 from armlab.common.report.palette import SeriesStyle, series_style
@@ -33,6 +34,7 @@ from bench.statistics.ends import place_of_zero
 from bench.statistics.performance import performance_profile
 from bench.store import open_store
 from bench.studies.properties import AlgorithmProperties, measure_isolated, stored_properties
+from bench.terminal import describe_frame
 
 _PROFILE_FACTORS = np.geomspace(1.0, 10.0, 60)
 _CURVE_POINTS = 60
@@ -131,13 +133,19 @@ def _read_asset(name: str) -> str:
     return (files("bench.report") / "assets" / name).read_text(encoding="utf-8")
 
 
-def write_report(where: Path, store: Path, out: Path | None) -> Path:
-    """Write the page about results; returns the file. Raises InputError, in one line, if there are no results."""
+def write_report(where: Path, store: Path, out: Path | None) -> ResultLines:
+    """Write the page about results; tells the file, the table and who beats whom.
+
+    Raises InputError, in one line, if there are no results.
+    """
     results = read_results(where, store)
     path = out or Path("results") / f"{results.name}_report.html"
     make_folder(path.parent)
     write_whole(path, report_page(results, analyse_cells(results), _measure_participants(results, store)))
-    return path
+    document = yield from written_files([path])
+    yield from results.missing
+    yield from describe_frame(results.trials)
+    return document
 
 
 def _measure_participants(results: ResultSet, store: Path) -> list[AlgorithmProperties]:

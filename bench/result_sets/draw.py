@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from armlab.common.files import write_whole
-from bench.comparison_figures import CONDITION_NUMBER, draw_budgets, draw_ends, draw_ranking
+from bench.comparison_figures import draw_budgets, draw_ends, draw_ranking
 from bench.result_sets.formats import make_folder, read_results
 from bench.result_sets.result_set import ResultSet
 from bench.studies.best_known.records import known_values
-from problem.presets import FunctionSettings
-from problem.registry import is_plug_in, parse_problem
+from bench.value_names import value_name
+from problem.registry import ProblemSettings, parse_problem
 
 MAX_PANELS = 3  # problems whose ends are drawn side by side
 
@@ -27,9 +27,11 @@ def draw_results(where: Path, store: Path, records: Path, folder: Path, formats:
     several = frame["budget"].nunique() > 1
     figures = {"ranking": draw_ranking(frame, formats)}
     if frame["problem"].nunique() <= MAX_PANELS and frame["swarm_size"].nunique() == 1:
-        known = _known_values(results, records)
-        name, draw = ("budgets", draw_budgets) if several else ("ends", draw_ends)
-        figures[name] = draw(frame, known, formats, _value_names(results))
+        problems = _parse_problems(results)
+        known = known_values(problems, records)
+        names = {label: value_name(problem) for label, problem in problems.items()}
+        kind, draw = ("budgets", draw_budgets) if several else ("ends", draw_ends)
+        figures[kind] = draw(frame, known, formats, names)
     paths = []
     for name, images in figures.items():
         for suffix, image in images.items():
@@ -39,19 +41,8 @@ def draw_results(where: Path, store: Path, records: Path, folder: Path, formats:
     return paths
 
 
-def _value_names(results: ResultSet) -> dict[str, str]:
-    """What the value of each problem is; a problem of another package may say so as `value_name` of its settings."""
-    names = {}
-    for label, settings in results.problems.items():
-        problem = parse_problem(settings, f"problem '{label}' of {results.name}")
-        known = "function value (-)" if isinstance(problem, FunctionSettings) else CONDITION_NUMBER
-        names[label] = str(getattr(problem, "value_name", "value")) if is_plug_in(problem) else known
-    return names
-
-
-def _known_values(results: ResultSet, records: Path) -> dict[str, float]:
-    problems = {
+def _parse_problems(results: ResultSet) -> dict[str, ProblemSettings]:
+    return {
         label: parse_problem(settings, f"problem '{label}' of {results.name}")
         for label, settings in results.problems.items()
     }
-    return known_values(problems, records)

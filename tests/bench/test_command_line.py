@@ -35,12 +35,10 @@ def test_run_writes_table_page_times_and_settings(armlab: Armlab, small: Path, t
     assert done.returncode == 0, done.stderr
     written = sorted(path.name for path in (tmp_path / "results").iterdir())
     assert written == ["small.csv", "small.md", "small.settings.yaml", "small_times.csv"]
-    assert [Path(line).name for line in done.stdout.splitlines()] == [
-        "small.csv",
-        "small.md",
-        "small_times.csv",
-        "small.settings.yaml",
-    ]
+    files, told = done.stdout.splitlines()[:4], done.stdout.splitlines()[4:]
+    assert [Path(line).name for line in files] == ["small.csv", "small.md", "small_times.csv", "small.settings.yaml"]
+    assert told[0].split()[:2] == ["algorithm", "median"]
+    assert told[-1].endswith("3 repetitions are too few to tell any pair apart")
     lines = (tmp_path / "results" / "small.csv").read_text().splitlines()
     assert lines[0] == COLUMNS
     assert [line.split(",")[0] for line in lines[1:]] == ["spso", "de"]

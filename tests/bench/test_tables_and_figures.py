@@ -93,12 +93,12 @@ def sweep() -> pd.DataFrame:
 
 
 def test_figures_have_the_same_bytes_for_the_same_data(sweep: pd.DataFrame) -> None:
-    assert draw_cost(summary_table(sweep)) == draw_cost(summary_table(sweep))
+    assert draw_cost(summary_table(sweep), "value") == draw_cost(summary_table(sweep), "value")
     assert draw_times(times_table(sweep)) == draw_times(times_table(sweep))
 
 
 def test_figures_are_png_and_svg_without_a_date(sweep: pd.DataFrame) -> None:
-    images = draw_cost(summary_table(sweep))
+    images = draw_cost(summary_table(sweep), "value")
     assert images["png"].startswith(b"\x89PNG")
     assert b"<svg" in images["svg"]
     assert b"dc:date" not in images["svg"]
@@ -106,7 +106,7 @@ def test_figures_are_png_and_svg_without_a_date(sweep: pd.DataFrame) -> None:
 
 def test_figures_can_be_drawn_where_ends_are_infeasible(sweep: pd.DataFrame) -> None:
     sweep.loc[sweep["swarm_size"] == 10, "violation"] = 1.0
-    assert set(draw_cost(summary_table(sweep))) == {"png", "svg"}
+    assert set(draw_cost(summary_table(sweep), "value")) == {"png", "svg"}
 
 
 def test_convergence_can_be_drawn_where_nothing_is_feasible_at_first() -> None:
@@ -151,7 +151,7 @@ def test_the_figure_of_ranks_orders_by_average_rank_and_says_when_nothing_can_be
     assert "<!-- rank (1: best) in 12 problems -->" in many
     assert "repetitions" in draw_ranking(_comparison(1))["svg"].decode()
     budgets = pd.concat([_comparison(2).assign(budget=budget) for budget in (100, 200)])
-    assert "in 4 cases (problem, swarm size, budget)" in draw_ranking(budgets)["svg"].decode()
+    assert "of 4 cases (problem, swarm size, budget)" in draw_ranking(budgets)["svg"].decode()
 
 
 def test_the_figure_of_budgets_has_a_tick_for_each_budget() -> None:

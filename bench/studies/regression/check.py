@@ -12,6 +12,7 @@ from scipy.stats import mannwhitneyu
 
 from armlab.common.arrays import Array
 from armlab.common.statistics import adjust_by_holm
+from armlab.common.text_table import text_table
 from bench.statistics import quantile
 from bench.studies.regression.sweep import Baseline, Cell, Ends
 
@@ -115,7 +116,7 @@ class CheckVerdict:
     def lines(self) -> list[str]:
         """A table of all cells, and below it the findings, a sentence for each cell that differs."""
         return [
-            *_text_table([_COLUMN_HEADS, *(self._row(comparison) for comparison in self.comparisons)]),
+            *text_table([_COLUMN_HEADS, *(self._row(comparison) for comparison in self.comparisons)]),
             *self.sentences(),
         ]
 
@@ -172,8 +173,3 @@ def _format_quartiles(ends: Array) -> str:
 def _format_change(before: float, after: float) -> str:
     factor = f" (x {after / before:.2f})" if np.isfinite(before) and np.isfinite(after) else ""
     return f"{before:.2f} -> {after:.2f}{factor}"
-
-
-def _text_table(rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
