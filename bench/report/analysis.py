@@ -83,6 +83,16 @@ class Cell:
         """95 % bootstrap interval of its median."""
         return quantile_interval(self.ends(algorithm))
 
+    def seconds_per_evaluation(self, algorithm: str) -> float:
+        """Median processor time of a run over its evaluations, everything included; NaN where no run has one."""
+        rows = self.trials[(self.trials["algorithm"] == algorithm) & (self.trials["evaluations"] > 0)]
+        return float((rows["seconds"] / rows["evaluations"]).median())
+
+    def work(self, algorithm: str) -> float:
+        """The same in a fixed unit, which other machines reproduce: that of the cheapest algorithm on this problem."""
+        costs = [self.seconds_per_evaluation(name) for name in self.algorithms]
+        return self.seconds_per_evaluation(algorithm) / float(np.nanmin(costs))
+
     @cached_property
     def losses(self) -> pd.DataFrame:
         """log10 of the ends, a row a repetition and a column an algorithm, an infeasible one worse than all others."""

@@ -56,6 +56,7 @@ def _problem_data(cell: Cell) -> dict[str, Any]:
         "name": cell.label,
         "zero": None if (zero := place_of_zero(_shown_values(cell))) is None else float(f"{zero:.4g}"),
         "evaluations": _to_json_numbers(cell.moments),
+        **_time_data(cell),
         "convergence": {name: [_to_json_numbers(part) for part in parts] for name, parts in curves.items()},
         "reached": {
             name: _to_json_numbers(share_of_targets_reached([cell], name, cell.moments)) for name in cell.algorithms
@@ -63,6 +64,32 @@ def _problem_data(cell: Cell) -> dict[str, Any]:
         "ends": {name: _to_json_numbers(cell.ends(name)) for name in cell.algorithms},
         "boxes": {name: _to_json_numbers(_quartiles(cell, name)) for name in cell.algorithms},
     }
+
+
+def _time_data(cell: Cell) -> dict[str, Any]:
+    """Medians of the best so far against seconds of one core, on one grid for all; null before a run's first and after
+    its last evaluation. Empty where results came without seconds.
+    """
+    if "seconds" not in cell.trials:
+        return {}
+    costs = {name: cell.seconds_per_evaluation(name) for name in cell.algorithms}
+    known = [cost for cost in costs.values() if cost > 0]
+    if not known:
+        return {}
+    grid = np.geomspace(cell.moments[0] * min(known), cell.moments[-1] * max(known), _CURVE_POINTS)
+    medians = {name: cell.progress[name].quartiles[1] for name in cell.algorithms}
+    values = {name: _value_at(grid, cell.moments * costs[name], medians[name]) for name in cell.algorithms}
+    return {
+        "seconds": _to_json_numbers(grid),
+        "against_time": {name: _to_json_numbers(found) for name, found in values.items()},
+    }
+
+
+def _value_at(grid: Array, times: Array, values: Array) -> Array:
+    """The last value at each time of the grid, infinite before the first and after the last one."""
+    place = np.searchsorted(times, grid * (1 + 1e-9), side="right") - 1
+    there = (place >= 0) & (grid <= times[-1] * (1 + 1e-9))
+    return np.where(there, values[np.maximum(place, 0)], np.inf)
 
 
 def _shown_values(cell: Cell) -> Array:

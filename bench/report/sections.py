@@ -25,6 +25,7 @@ def ends_table(cell: Cell) -> Table:
     """Medians with intervals, quartiles, feasible share, area and expected running times on one problem."""
     places = [round(share * (len(cell.targets) - 1)) for share in _TARGET_SHARES] if len(cell.targets) else []
     headings = ["algorithm", "median (95 %)", "quartiles", "minimum", "feasible", "area"]
+    headings += ["s a run", "work"] if "seconds" in cell.trials else []
     headings += [f"ERT to {cell.targets[place]:.3g}" for place in places]
     return Table(headings, [_ends_row(cell, name, places) for name in cell.algorithms])
 
@@ -39,8 +40,17 @@ def _ends_row(cell: Cell, name: str, places: Sequence[int]) -> list[str]:
         format_number(summary.minimum),
         f"{summary.feasible_share:.0%}",
         "–" if np.isnan(progress.area) else f"{progress.area:.2f}",
+        *_time_cells(cell, name),
         *(format_number(progress.expected[place]) for place in places),
     ]
+
+
+def _time_cells(cell: Cell, name: str) -> list[str]:
+    """Median seconds of a run, and its work an evaluation."""
+    if "seconds" not in cell.trials:
+        return []
+    rows = cell.trials[cell.trials["algorithm"] == name]
+    return [format_number(float(rows["seconds"].median())), format_number(cell.work(name))]
 
 
 def duels_table(cell: Cell) -> Table:

@@ -18,7 +18,8 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium o
 @pytest.fixture(scope="module")
 def address(tmp_path_factory: pytest.TempPathFactory) -> str:
     folder = tmp_path_factory.mktemp("report")
-    return write_report(*ran(folder), folder / "page.html").as_uri()
+    list(write_report(*ran(folder), folder / "page.html"))
+    return (folder / "page.html").as_uri()
 
 
 @pytest.fixture(scope="module")

@@ -37,12 +37,28 @@ function drawConvergence(problem) {
   drawLines(figureOf("convergence"), { title: "Median of the best so far", words, xs, series: lines, x, y });
 }
 
+function drawAgainstTime(problem) {
+  const figure = figureOf("against-time");
+  if (!problem.seconds) {
+    figure.replaceChildren();
+    return;
+  }
+  const xs = problem.seconds;
+  const lines = series(shown(), problem.against_time);
+  const known = lines.flatMap((line) => line.values).filter((value) => value !== null);
+  const x = { low: xs[0], high: xs[xs.length - 1], logarithmic: true, label: "seconds of one core" };
+  const y = spanOf(known.length ? known : [1, 10], problem.zero);
+  const words = `Convergence on ${problem.name} against time; the table below has the seconds`;
+  drawLines(figure, { title: "Median of the best so far, against time", words, xs, series: lines, x, y });
+}
+
 function drawProblem() {
   const problem = data.problems[chooser.selectedIndex];
   for (const part of document.querySelectorAll(".problem")) {
     part.hidden = Number(part.dataset.problem) !== chooser.selectedIndex;
   }
   drawConvergence(problem);
+  drawAgainstTime(problem);
   drawShares("reached", "Share of targets reached", problem.evaluations, problem.reached, "evaluations");
   drawBoxes(figureOf("ends"), problem, shown());
 }
