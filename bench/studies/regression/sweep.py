@@ -157,6 +157,12 @@ def read_baseline(path: Path, sweep: Sweep) -> Baseline:
     return baseline
 
 
+def read_provenance(path: Path) -> dict[str, Any]:
+    """Versions and processor of the machine that made a baseline."""
+    found: dict[str, Any] = _read_content(path).get("provenance") or {}
+    return found
+
+
 def read_part_of_baseline(path: Path, sweep: Sweep) -> tuple[Baseline, Any]:
     """A baseline that may lack problems and algorithms of the sweep, and its provenance.
 

@@ -1,18 +1,23 @@
 """The three tasks of `armlab regression`, each as the lines that it prints and an exit code."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from algorithms.registry import load
 from bench.files import check_folder
+from bench.fingerprint import calls_lapack
+from bench.processor import processor_kernels
 from bench.run import ProgressBar
 from bench.studies.regression.check import judge_run
 from bench.studies.regression.sweep import (
     Baseline,
     Cell,
+    Sweep,
     plan_entries,
     read_baseline,
     read_part_of_baseline,
+    read_provenance,
     read_sweep,
     run_entries,
     write_baseline,
@@ -48,7 +53,8 @@ class RegressionTasks:
         entries = plan_entries(sweep)
         with self.bar(len(entries), 0) as progress:
             verdict = judge_run(baseline, run_entries(entries, self.workers, progress.update), sweep.false_alarm_rate)
-        return TaskReport(verdict.lines(), 0 if verdict.passed else 1)
+        places = describe_processors(sweep, read_provenance(self.results / BASELINE_FILE))
+        return TaskReport([*verdict.lines(), *places], 0 if verdict.passed else 1)
 
     def update_baseline(self) -> TaskReport:
         """Make the baseline anew from the present code, and check that the fixed run passes against it."""
@@ -100,3 +106,16 @@ class RegressionTasks:
         with self.bar(planned_trials(sweep), 0) as progress:
             calibration = calibrate(sweep, baseline, self.workers, progress.update)
         return TaskReport([f"wrote {path}" for path in write_calibration(self.results, sweep, calibration)])
+
+
+def describe_processors(sweep: Sweep, recorded: Mapping[str, str]) -> list[str]:
+    """For which kernels the cells of algorithms that call LAPACK hold, here and in the baseline, in words."""
+    names = [choice.name for choice in sweep.algorithms if calls_lapack(load(choice.name))]
+    if not names:
+        return []
+    here = processor_kernels()
+    there = recorded.get("blas_kernels", "kernels that it does not name")
+    return [
+        f"{', '.join(names)} call LAPACK: their cells are of {here['blas_kernels']} ({here['simd']}); the baseline is "
+        f"of {recorded.get('processor')}, {there}. Other kernels give other ends of the same distribution."
+    ]
