@@ -74,8 +74,15 @@ def predict(model: Path, recording: Path, out: Path | None) -> ResultLines:
 @click.option("--experiments", type=click.IntRange(min=10), default=1000, show_default=True)
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
+@click.option(
+    "--part",
+    type=click.Choice(["all", "identification", "superiority"]),
+    default="all",
+    show_default=True,
+    help="Measure a part alone; the file keeps the other one.",
+)
 @prints_lines
-def coverage(experiments: int, seed: int, results: Path) -> Iterator[str]:
+def coverage(experiments: int, seed: int, results: Path, part: str) -> Iterator[str]:
     """Measure how often 95 % intervals contain the truth.
 
     Simulates experiments and identifies them, and compares simulated ends of two algorithms (A12). Writes
@@ -85,11 +92,14 @@ def coverage(experiments: int, seed: int, results: Path) -> Iterator[str]:
     from armlab.identification.coverage import measure_coverage
     from bench.statistics.superiority import describe_coverage, superiority_coverage
 
-    identified = yield from measure_coverage(experiments, seed)
-    effect_sizes = superiority_coverage()
-    yield from describe_coverage(effect_sizes)
-    text = json.dumps({**identified, "superiority": effect_sizes}, indent=2, allow_nan=False) + "\n"
-    yield from map(str, write_texts({"coverage.json": text}, results))
+    path = results / "coverage.json"
+    found = json.loads(path.read_text()) if part != "all" and path.exists() else {}
+    if part != "superiority":
+        found |= yield from measure_coverage(experiments, seed)
+    if part != "identification":
+        found["superiority"] = superiority_coverage()
+        yield from describe_coverage(found["superiority"])
+    yield from map(str, write_texts({path.name: json.dumps(found, indent=2, allow_nan=False) + "\n"}, results))
 
 
 @click.command("real-conditioning")

@@ -1,3 +1,4 @@
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -100,9 +101,12 @@ def test_an_unknown_public_recording_names_the_nearest(tmp_path: Path) -> None:
 
 
 def test_coverage_writes_what_it_measured(tmp_path: Path) -> None:
-    text = invoke(coverage, "--experiments", 10, "--results", tmp_path)
+    (tmp_path / "coverage.json").write_text('{"superiority": {"kept": 1}}')
+    text = invoke(coverage, "--experiments", 10, "--results", tmp_path, "--part", "identification")
     assert "in 10 experiments" in text
-    assert (tmp_path / "coverage.json").is_file()
+    found = json.loads((tmp_path / "coverage.json").read_text())
+    assert found.keys() == {"seed", "coverage", "kinds", "superiority"}
+    assert found["superiority"] == {"kept": 1}
 
 
 def test_errors_say_which_torque_they_are_of() -> None:

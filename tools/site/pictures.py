@@ -50,7 +50,13 @@ def draw_table3(table: pd.DataFrame) -> bytes:
         ours, theirs = line_style(0).color, line_style(1).color
         axes.hlines(places + 0.1, table["minimum"], table["upper_quartile"], color=ours, linewidth=1)
         axes.hlines(places + 0.1, table["lower_quartile"], table["upper_quartile"], color=ours, linewidth=6, alpha=0.4)
-        axes.plot(table["median"], places + 0.1, "o", color=ours, label="ours: minimum, quartiles, median")
+        axes.plot(
+            table["median"],
+            places + 0.1,
+            "o",
+            color=ours,
+            label="ours, algorithms as read here: minimum, quartiles, median",
+        )
         rows = [printed[name] for name in table["algorithm"]]
         axes.plot([row.minimum for row in rows], places - 0.2, "<", color=theirs, label="paper: minimum")
         axes.plot([row.average for row in rows], places - 0.2, "D", color=theirs, mfc="none", label="paper: average")
@@ -58,7 +64,7 @@ def draw_table3(table: pd.DataFrame) -> bytes:
         axes.set(xscale="log", xlabel="condition number of the best trajectory (logarithmic)")
         axes.set_xticks([5, 10, 20, 40], ["5", "10", "20", "40"])
         axes.minorticks_off()
-        figure.legend(loc="outside lower center", ncols=3)
+        figure.legend(loc="outside lower center", ncols=2)
 
     return render_figure((7.2, 3.4), fill)["svg"]
 
