@@ -14,6 +14,8 @@ from bench.studies.landscape.choice_studies import (
     median_number,
     space_section,
     space_sentence,
+    time_section,
+    time_sentence,
     tuning_section,
     tuning_sentence,
 )
@@ -47,6 +49,7 @@ def choice_page(sources: Sources) -> str:
         *_plain_section(sources),
         *_asking_section(sources),
         *budget_section(sources),
+        *time_section(sources),
         *space_section(sources),
         *tuning_section(sources),
         *_kind_section(sources),
@@ -62,6 +65,7 @@ def _short_answer(sources: Sources) -> Iterator[str]:
         _asking_sentence(sources),
         space_sentence(sources),
         budget_sentence(sources),
+        time_sentence(sources),
         tuning_sentence(sources),
         _kind_sentence(sources),
     ]

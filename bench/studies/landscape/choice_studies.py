@@ -1,12 +1,13 @@
 """Parts of the page about the choice that come from the studies of budgets, search space and tuning."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from algorithms.registry import names_with_derivatives
+from algorithms.sqp import SPSOThenSQPParams
 from armlab.common.markdown import markdown_table
 from bench.printed import display_name
 from bench.studies.landscape.ratios import Ratio, mean_ratio, quartile_ratio_text
@@ -50,6 +51,69 @@ def budget_section(sources: Sources) -> Iterator[str]:
         ratio = quartile_ratio_text(group.loc[plain], group.loc[asking], compared.repetitions)
         rows.append([problem, f"{budget:,}", _median_text(group, asking), _median_text(group, plain), ratio])
     yield markdown_table(["problem", "evaluations", "least with derivatives", "least without", "ratio"], rows, (1,))
+
+
+def time_sentence(sources: Sources) -> str:
+    """At equal time, the least median with derivatives beside the least without."""
+    told = [f"`{row.problem}`: {row.asking} against {row.plain}" for row in _time_rows(sources)]
+    return f"- **In equal time of one core**, with derivatives against without: {'; '.join(told)}."
+
+
+def time_section(sources: Sources) -> Iterator[str]:
+    """With and without derivatives at equal time, whose unit is an evaluation in a population."""
+    yield "## In equal time"
+    yield (
+        "Time is counted in a fixed unit, an evaluation of the same problem in a population, so that any machine can "
+        "repeat it. A point with derivatives takes as long as "
+        + ", ".join(f"{price['in_population']:.0f} evaluations on `{name}`" for name, price in sources.prices.items())
+        + " (`results/speed.md`), and counts as "
+        + ", ".join(f"{price['stated']:.0f}" for price in sources.prices.values())
+        + " in the budgets above; `spso-sqp` asks for none in the first half of its budget. Without derivatives: "
+        "the budget nearest to that time. The time of the solvers themselves is left out."
+    )
+    headings = [
+        "problem",
+        "evaluations",
+        "as counted in time",
+        "least with derivatives",
+        "without, at",
+        "least",
+        "ratio",
+    ]
+    rows = [
+        [row.problem, f"{row.budget:,}", f"{row.work:,.0f}", row.asking, f"{row.plain_budget:,}", row.plain, row.ratio]
+        for row in _time_rows(sources)
+    ]
+    yield markdown_table(headings, rows, (1, 2, 4))
+
+
+class _TimeRow(NamedTuple):
+    """A budget with derivatives, its work in evaluations of a population, and the best without in that time."""
+
+    problem: str
+    budget: int
+    work: float
+    asking: str
+    plain_budget: int
+    plain: str
+    ratio: str
+
+
+def _time_rows(sources: Sources) -> Iterator[_TimeRow]:
+    plain = {(name, budget): group for name, budget, group in _budget_groups(sources.budgets)}
+    for problem, budget, group in _budget_groups(sources.derivative_budgets):
+        price = sources.prices.get(problem)
+        budgets = [known for name, known in plain if name == problem]
+        if price is None or not budgets:
+            continue
+        asking = str(next(name for name in group.index if name in names_with_derivatives()))
+        plain_share = SPSOThenSQPParams().swarm_share if asking == "spso-sqp" else 0.0
+        work = budget * (plain_share + (1 - plain_share) * price["in_population"] / price["stated"])
+        nearest = budgets[int(np.argmin(np.abs(np.log(np.array(budgets) / work))))]
+        rival = plain[problem, nearest]
+        best = rival.index[0]
+        ratio = f"{rival.loc[best, 'median'] / group.loc[asking, 'median']:.2f}"
+        yield _TimeRow(problem, budget, work, _median_text(group, asking), nearest, _median_text(rival, best), ratio)
 
 
 def _budget_groups(compared: Comparison) -> Iterator[tuple[str, int, pd.DataFrame]]:

@@ -1,5 +1,6 @@
 """The results that the page about the choice reads: summary tables with their settings, and who is chosen from them."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -65,9 +66,21 @@ class Comparison:
         return self.table.assign(budget=budgets[np.minimum(places, len(budgets) - 1)])
 
 
+def _read_prices(path: Path) -> dict[str, dict[str, float]]:
+    """Of `armlab speed`; raises InputError where there is no such file."""
+    try:
+        found: dict[str, dict[str, float]] = json.loads(path.read_text())["derivative_price"]
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(f"cannot read {path}, which `armlab speed` writes: {error}".splitlines()[0]) from None
+    return {name: price for name, price in found.items() if "," not in name}
+
+
 @dataclass(frozen=True, eq=False)
 class Sources:
-    """All results that the page reads. features, correlations: of the landscapes."""
+    """All results that the page reads. features, correlations: of the landscapes.
+
+    prices: of a point with derivatives by problem, `stated` as budgets count it, and `in_population` as its time does.
+    """
 
     suite: Comparison
     held_out: Comparison
@@ -77,6 +90,7 @@ class Sources:
     space: Comparison
     space_duels: pd.DataFrame
     tuned: pd.DataFrame
+    prices: dict[str, dict[str, float]]
     features: pd.DataFrame
     correlations: pd.DataFrame
 
@@ -95,6 +109,7 @@ class Sources:
             space=Comparison.read(results / "search_space", "search_space"),
             space_duels=pd.read_csv(results / "search_space" / "comparison.csv"),
             tuned=pd.read_csv(results / "tune" / "tune_judged.csv").set_index("algorithm"),
+            prices=_read_prices(results / "speed.json"),
             features=features,
             correlations=correlations,
         )
