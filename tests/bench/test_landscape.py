@@ -270,7 +270,7 @@ def test_rows_that_ask_for_derivatives_answer_for_them(
     options = committed(tmp_path)
     results = tmp_path / "results"
     for path in (ROOT / "results").rglob("*"):
-        if path.suffix in (".csv", ".yaml") and path.parent.name in (
+        if path.suffix in (".csv", ".yaml", ".json") and path.parent.name in (
             "results",
             "derivatives",
             "study",
