@@ -64,6 +64,6 @@ def test_a_worker_with_other_code_refuses_to_compute(small: Path) -> None:
     ((key, result),) = run_in_worker([("another key", entry.trial)]).results
     assert key == "another key"
     assert isinstance(result, Failure)
-    assert "has other code or files" in result.traceback
+    assert "has other code or files" in result.reason
     ((_, result),) = run_in_worker([(entry.key, entry.trial)]).results
     assert not isinstance(result, Failure)
