@@ -160,7 +160,7 @@ def direction_of_motion(scene: Scene, *joints: int) -> Array:
     return np.asarray(np.where(steady, np.sign(velocity), velocity / np.where(steady, 1.0, change)))
 
 
-STANDING_SHARE, STANDING_SHARE_OF_ALL = 0.005, 0.001
+STANDING_SHARE, STANDING_SHARE_OF_ALL = 0.003, 0.001
 
 
 def standing_speed(scene: Scene, joints: Sequence[int]) -> float:

@@ -11,7 +11,7 @@ from armlab.effects.library import effect_named
 MAX_SENTENCES, MAX_WORDS, MAX_CAUSES, MAX_OF_JOINT = 3, 70, 4, 2
 ROUNDING = 1e-6  # of shares and errors that are added up again
 FIRST_SHARE = re.compile(r"^(\d+) % of the error comes from ")
-UNIT = r"(?:N m|N|kg|%|rad|mm|m|s|ms|Hz|V|A|deg)"
+UNIT = r"(?:N m|N|kg|%|mrad|rad|mm|m|s|ms|Hz|V|A|deg)"
 NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?![\w.]*\d)")
 PLACE = re.compile(r"(?:joints?|links?|all) (?:\d+(?:, | and )?)+")  # numbers of joints have no unit
 
