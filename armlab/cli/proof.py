@@ -463,12 +463,20 @@ def prove_field(
 @click.option("--simulated", type=click.IntRange(min=0), default=300, show_default=True, help="Simulated recordings.")
 @click.option("--real", type=click.IntRange(min=0), default=200, show_default=True, help="Public recordings.")
 @click.option("--nulls", type=click.IntRange(min=0), default=300, show_default=True, help="Nothing is wrong.")
+@click.option(
+    "--folder",
+    "folders",
+    multiple=True,
+    metavar="NAME",
+    help="A recording with a D-H table below ARMLAB_RECORDINGS, beside the public ones, repeatable.",
+)
 @_sealed_set_options("setup", "cases")
 @prints_lines
 def prove_setup(
     simulated: int,
     real: int,
     nulls: int,
+    folders: tuple[str, ...],
     seed: int | None,
     work: Path | None,
     results: Path | None,
@@ -482,7 +490,7 @@ def prove_setup(
     from armlab.concealed.setup.prove import SETUP, SetupSet
 
     chosen, folder, commit = _choose_set(seed, work, "setup")
-    cases = SetupSet(simulated, real, nulls, chosen)
+    cases = SetupSet(simulated, real, nulls, chosen, folders)
     return SETUP.prove(cases, folder, results or folder / "score", jobs, commit)
 
 

@@ -2,12 +2,17 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
 
+from armlab.common.errors import InputError
 from armlab.concealed.plan import DEVELOPMENT_SEEDS, Plan, draw_plan, random_stream
 from armlab.concealed.setup.mistakes import EFFECTS, Injected, draw_mistake
+from armlab.recordings.load import load_recording
+from armlab.recordings.public import LOCAL_COPIES_VARIABLE, local_copies
+from armlab.recordings.recording_file import FILE_NAME
 from problem.arm import Arm
 from problem.robot_file import load_arm
 
@@ -22,7 +27,10 @@ SOURCES: tuple[Source, ...] = get_args(Source)
 
 @dataclass(frozen=True)
 class SetupCase:
-    """One case. index: among those of its source. recording: a public one, empty for a simulated one."""
+    """One case. index: among those of its source.
+
+    recording: a public one, or a folder of the local copies; empty for a simulated one.
+    """
 
     seed: int
     source: Source
@@ -53,7 +61,11 @@ class SetupCase:
     @property
     def right_gravity(self) -> tuple[float, float, float]:
         """Gravity in the base frame as it is, m/s2."""
-        return load_arm(self.recording).gravity if self.recording else self.plan().true_arm.gravity
+        if not self.recording:
+            return self.plan().true_arm.gravity
+        if self.recording in PUBLIC:
+            return load_arm(self.recording).gravity
+        return load_recording(local_folder(self.recording)).arm.gravity
 
     def plan(self) -> Plan:
         """The simulated recording."""
@@ -62,13 +74,22 @@ class SetupCase:
         return _hang(plan, self) if self.kind == "near miss" else plan
 
 
-def draw_cases(seed: int, simulated: int, real: int, nulls: int) -> Iterator[SetupCase]:
-    """All cases of a set."""
+def local_folder(name: str) -> Path:
+    """A recording folder with a D-H table among the local copies; InputError where there is none."""
+    local = local_copies()
+    if local is None or not (local / name / FILE_NAME).is_file() or not (local / name / "robot.yaml").is_file():
+        raise InputError(f"no folder {name} with {FILE_NAME} and robot.yaml below {LOCAL_COPIES_VARIABLE}")
+    return local / name
+
+
+def draw_cases(seed: int, simulated: int, real: int, nulls: int, folders: tuple[str, ...] = ()) -> Iterator[SetupCase]:
+    """All cases of a set. folders: recordings of the local copies beside the public ones."""
+    recordings = (*PUBLIC, *folders)
     for index in range(simulated):
         yield SetupCase(seed, "simulated", index, KIND_CYCLE[index % len(KIND_CYCLE)])
     for index in range(real):
         kind: Kind = "pair" if index % 4 == 3 else "alone"
-        yield SetupCase(seed, "real", index, kind, PUBLIC[index % len(PUBLIC)])
+        yield SetupCase(seed, "real", index, kind, recordings[index % len(recordings)])
     for index in range(nulls):
         yield SetupCase(seed, "null", index, NULL_CYCLE[index % len(NULL_CYCLE)])
 

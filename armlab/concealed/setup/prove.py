@@ -12,7 +12,7 @@ from armlab.concealed.case_files import write_observation
 from armlab.concealed.sealed import OBSERVATION, TRUTH_FILE, Score, SealedTier
 from armlab.concealed.setup.mistakes import Injected, inject
 from armlab.concealed.setup.oracle import can_be_seen
-from armlab.concealed.setup.plan import SetupCase, draw_cases, draw_mistakes
+from armlab.concealed.setup.plan import PUBLIC, SetupCase, draw_cases, draw_mistakes, local_folder
 from armlab.concealed.setup.score import score_setup
 from armlab.concealed.simulate import arm_with_effects
 from armlab.concealed.sizing import simulate_case
@@ -22,22 +22,28 @@ from armlab.recordings.public import open_public_recording
 
 @dataclass(frozen=True)
 class SetupSet:
-    """How many cases of each source, from a seed; seeds 1000-1999 are for development."""
+    """How many cases of each source, from a seed; seeds 1000-1999 are for development.
+
+    folders: recordings of the local copies that stand beside the public ones.
+    """
 
     simulated: int
     real: int
     nulls: int
     seed: int
+    folders: tuple[str, ...] = ()
 
     def plans(self) -> Iterator[SetupCase]:
         """The plans of all cases."""
-        return draw_cases(self.seed, self.simulated, self.real, self.nulls)
+        return draw_cases(self.seed, self.simulated, self.real, self.nulls, self.folders)
 
 
 def _make(case: SetupCase, draft: Path) -> None:
     right, wrong, public = draft / "right", draft / OBSERVATION, draft / "public"
     true_arm, physics = None, list[list[Any]]()
-    if case.recording:
+    if case.recording and case.recording not in PUBLIC:
+        shutil.copytree(local_folder(case.recording), right)
+    elif case.recording:
         open_public_recording(case.recording, public)
         shutil.copytree(public / case.recording, right)
         shutil.rmtree(public)
