@@ -18,8 +18,16 @@ from armlab.recordings.reading import search
 from armlab.recordings.reading.answer import Answer, lapse, read_rightly
 from armlab.recordings.reading.corrected import correct_recording, corrected_texts
 from armlab.recordings.reading.fit import Fitter
-from armlab.recordings.reading.judge import Judge
-from armlab.recordings.reading.mistakes import clock_error, encoder_offset, late_torque, signs, take_back, units
+from armlab.recordings.reading.judge import Errors, Judge, View
+from armlab.recordings.reading.mistakes import (
+    clock_error,
+    contradicted_by,
+    encoder_offset,
+    late_torque,
+    signs,
+    take_back,
+    units,
+)
 from armlab.recordings.reading.mistakes import spring as with_spring
 from armlab.recordings.reading.reading import Mistake, Reading, read_as_is
 from armlab.recordings.reading.signals import thin_channels
@@ -469,3 +477,42 @@ def test_friction_of_coupled_axes_is_that_of_their_drives(tmp_path: Path) -> Non
     answer = answer_to(recording_with(tmp_path / "rig", to_motors, settings))
     assert names_of(answer) == []
     assert answer.share < 0.05
+
+
+def test_readings_are_judged_on_instants_that_took_no_part_in_the_search(tmp_path: Path) -> None:
+    rows = thin_channels(recording_with(tmp_path / "rig"), TUNING)
+    assert rows is not None
+    searched, judged = (
+        set(zip(each.run.tolist(), each.stamps.tolist(), strict=True)) for each in (rows.search, rows.judge)
+    )
+    assert not searched & judged
+    assert len(judged) > 3 * len(searched) > 0
+
+
+def test_what_rises_counts_twice_and_what_is_not_sure_counts_nothing() -> None:
+    """Three joints fall by 1, 0.5 and -0.2 in every block; then the blocks differ by 0.4 at the first one."""
+    falls = np.array([1.0, 0.5, -0.2])
+    after = Errors(np.full(3, 0.1), np.zeros((4, 3)))
+    sure = View.between(Errors(0.1 * np.exp(falls), np.tile(falls, (4, 1))), after, 0.01)
+    assert sure.least_gain(2.0, of_one_joint=False) == pytest.approx(1.0 + 0.5 - 2 * 0.2)
+    assert sure.least_gain(2.0, of_one_joint=True) == pytest.approx(1.0)
+    blocks = np.tile(falls, (4, 1)) + 0.4 * np.array([[1, 0, 0], [-1, 0, 0], [1, 0, 0], [-1, 0, 0]])
+    unsure = View.between(Errors(0.1 * np.exp(falls), blocks), after, 0.01)
+    deviation = 0.4 * np.sqrt(4 / 3) / 2  # of the mean of four
+    assert unsure.least_gain(2.0, of_one_joint=False) == pytest.approx(1.1 - 2 * deviation)
+
+
+def test_a_joint_that_leaves_little_contradicts_another_sign_or_column_of_position_or_torque_alone() -> None:
+    """Where both change together its friction stays, a wrong factor hides in it, and a zero shows at other joints."""
+    contradicted = {
+        Mistake("torque_sign", 2): {2},
+        Mistake("joint_direction", 2, form="position"): {2},
+        Mistake("joint_direction", 2, form="position and torque"): set(),
+        Mistake("channel_swap", joints=(1, 3), form="torque"): {1, 3},
+        Mistake("channel_swap", joints=(1, 3), form="position and torque"): set(),
+        Mistake("channel_order", joints=(1, 3, 4, 2), form="position"): {2, 3, 4},
+        Mistake("axis_coupling", joints=(2, 3), form="position"): {3},
+        Mistake("unit_error", 2, form="position"): set(),
+        Mistake("encoder_offset", 2): set(),
+    }
+    assert {mistake: set(contradicted_by(mistake)) for mistake in contradicted} == contradicted

@@ -69,7 +69,7 @@ class ArmVerdict:
 
 
 def best_wrong_readings(folders: Sequence[RealFolder], tuning: ReadingTuning) -> Iterator[WrongReading]:
-    """The best wrong reading of each recording with torque that can be judged."""
+    """The best wrong reading of each recording with torque that is compared with links, and can be judged."""
     for folder in folders:
         recording = _recording(folder)
         judge = None if recording is None else Judge.of(recording, tuning)
@@ -81,15 +81,16 @@ def _recording(folder: RealFolder) -> Recording | None:
     if is_motion_only(folder.path):
         return None
     try:
-        return load_recording(folder.path)
+        recording = load_recording(folder.path)
     except (InputError, DataError):
         return None
+    return None if read_simulation(recording, None).kind == "simulated" else recording
 
 
 def _best_wrong_reading(folder: RealFolder, recording: Recording, judge: Judge) -> WrongReading:
     start = judge.trial(read_as_is(recording, read_simulation(recording, None).inertial))
     tried = [each for each in search_singles(judge, start) if each.reading.mistakes[-1].effect != SPRING]
-    falling = [each for each in tried[:JUDGED] if judge.may_explain(start, each, judge.improbability(each.reading))]
+    falling = [each for each in tried[:JUDGED] if judge.may_explain(start, each, each.reading.mistakes[-1], 0.0)]
     judged = [(judge.evidence(start, each, each.reading.mistakes[-1]), each) for each in falling or tried[:1]]
     evidence, best = max(judged, key=lambda pair: pair[0])
     spread = tried[:: max(len(tried) // MISTAKES, 1)]

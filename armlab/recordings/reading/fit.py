@@ -13,7 +13,7 @@ same bodies (Lee, Wensing and Park 2020), whose barrier keeps every pseudo-inert
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,6 +112,32 @@ class Score:
 
 
 @dataclass(frozen=True, eq=False)
+class _Layout:
+    """Which columns a fit has: all of the links, then own ones. present: (joints, 8); the others stay zero.
+
+    kept: places among all columns; signed: places among the kept ones that are not negative, rest: of the others.
+    """
+
+    present: NDArray[np.bool_]
+    kept: NDArray[np.intp]
+    signed: NDArray[np.intp]
+    rest: NDArray[np.intp]
+
+
+@lru_cache(maxsize=64)
+def _layout(joints: int, springs: tuple[int, ...], second: tuple[bool, ...]) -> _Layout:
+    """All joints have friction, a rotor and an offset; some have a spring or a second drive."""
+    present = np.zeros((joints, JOINT_COLUMNS), dtype=bool)
+    present[:, :SPRING] = True
+    present[list(springs), SPRING] = True
+    present[list(second), SPRING + 1 :] = True
+    links, own = 10 * joints, np.flatnonzero(present)
+    signed = links + np.flatnonzero(~np.isin(own % JOINT_COLUMNS, OF_ANY_SIGN))
+    rest = np.setdiff1d(np.arange(links + len(own)), signed)
+    return _Layout(present, np.concatenate([np.arange(links), links + own]), signed, rest)
+
+
+@dataclass(frozen=True, eq=False)
 class Fitter:
     """Fits readings of the channels of one recording."""
 
@@ -162,17 +188,19 @@ class Fitter:
         The last link may carry a load: it is free in any case. physical: links that bodies can have.
         """
         columns, torque, weight = self._target(reading)
-        prior, present = self.prior(reading, torque), _present_columns(reading)
+        prior = self.prior(reading, torque)
+        second = tuple(place is not None for place in second_drives(reading))
+        layout = _layout(reading.joints, reading.springs, second)
         products = [_products(columns, torque, self.fold == number) for number in range(FOLDS)]
         power = [np.sum(torque[self.fold == number] ** 2, axis=0) for number in range(FOLDS)]
-        normal = [self._normal_equations(columns, products, weight, 1 - number) for number in range(FOLDS)]
+        normal = [self._normal_equations(columns, products, weight, 1 - number, layout) for number in range(FOLDS)]
         out = []
         for width in widths:
             each = np.full(reading.joints, width)
             each[-1] = max(width, self.tuning.free_width)
             squares, distance, fitted = np.zeros(reading.joints), 0.0, []
             for number, (gram, product) in enumerate(normal):
-                task = _Task(gram, product, prior, each**-2.0, present)
+                task = _Task(gram, product, prior, each**-2.0, layout)
                 links, own = task.physical() if physical else task.gaussian()
                 squares += _squares(columns.grams[number], products[number], power[number], links, own)
                 distance += task.distance(links, physical) / (
@@ -203,7 +231,7 @@ class Fitter:
         return out / np.bincount(self.channels.block, minlength=self.channels.blocks)[:, None]
 
     def _normal_equations(
-        self, columns: Columns, products: Sequence[Array], weight: Array, fold: int
+        self, columns: Columns, products: Sequence[Array], weight: Array, fold: int, layout: _Layout
     ) -> tuple[Array, Array]:
         """Gram matrix and product with the torque, in nats, of the rows of a fold."""
         joints, rows = len(weight), self.fold == fold
@@ -220,7 +248,7 @@ class Fitter:
             gram[:links, places] = scale[joint] * grams[joint, :links, links:]
             gram[places, :links] = gram[:links, places].T
             gram[places, places] = scale[joint] * grams[joint, links:, links:]
-        return gram, product
+        return gram[np.ix_(layout.kept, layout.kept)], product[layout.kept]
 
     def beyond_limits(self, reading: Reading) -> int:
         """How many joints move beyond their limits."""
@@ -280,59 +308,26 @@ def _squares(grams: Array, products: Array, power: Array, links: Array, own: Arr
     return np.asarray(power + np.sum(both * (np.einsum("jpq,jq->jp", grams, both) - 2 * products), axis=1))
 
 
-def _present_columns(reading: Reading) -> NDArray[np.bool_]:
-    """Which own columns a reading has, (joints, 8): all joints have friction, a rotor and an offset."""
-    present = np.zeros((reading.joints, JOINT_COLUMNS), dtype=bool)
-    present[:, :SPRING] = True
-    present[list(reading.springs), SPRING] = True
-    present[[place is not None for place in second_drives(reading)], SPRING + 1 :] = True
-    return present
-
-
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """One fit: minimise half of x' gram x - product' x plus the prior of the links, x = links and own columns.
+    """One fit: minimise half of x' gram x - product' x plus the prior of the links, x = links and own columns."""
 
-    present: (joints, 8), which own columns there are; the others stay zero.
-    """
-
-    full_gram: Array
-    full_product: Array
+    gram: Array
+    product: Array
     prior: Prior
     precision: Array  # (joints,) of the prior of each link
-    present: NDArray[np.bool_]
+    layout: _Layout
 
     @property
     def joints(self) -> int:
         """Number of joints."""
-        return len(self.present)
-
-    @cached_property
-    def _kept(self) -> NDArray[np.intp]:
-        links = 10 * self.joints
-        return np.concatenate([np.arange(links), links + np.flatnonzero(self.present)])
-
-    @cached_property
-    def gram(self) -> Array:
-        """Of the columns that there are."""
-        return self.full_gram[np.ix_(self._kept, self._kept)]
-
-    @cached_property
-    def product(self) -> Array:
-        """Of the columns that there are."""
-        return self.full_product[self._kept]
-
-    @cached_property
-    def _signed(self) -> NDArray[np.intp]:
-        """Places of what is not negative."""
-        own = np.flatnonzero(self.present) % JOINT_COLUMNS
-        return 10 * self.joints + np.flatnonzero(~np.isin(own, OF_ANY_SIGN))
+        return len(self.precision)
 
     def _split(self, x: Array) -> tuple[Array, Array]:
         """Links (10 * joints,) and all own columns (joints, 8)."""
         links = 10 * self.joints
-        own = np.zeros(self.present.shape)
-        own[self.present] = x[links:]
+        own = np.zeros(self.layout.present.shape)
+        own[self.layout.present] = x[links:]
         return x[:links], own
 
     @property
@@ -357,7 +352,7 @@ class _Task:
         product[:links] += information @ self.prior.centre
         lengths = np.sqrt(np.maximum(np.diag(gram), 1e-300))
         unit, right = gram / np.outer(lengths, lengths) + 1e-10 * np.eye(len(gram)), product / lengths
-        signed, rest = self._signed, np.setdiff1d(np.arange(len(gram)), self._signed)
+        signed, rest = self.layout.signed, self.layout.rest
         # of the others given those with a sign: x_rest = start - along @ x_signed
         solved = np.linalg.solve(unit[np.ix_(rest, rest)], np.column_stack([right[rest], unit[np.ix_(rest, signed)]]))
         start, along = solved[:, 0], solved[:, 1:]
@@ -373,7 +368,7 @@ class _Task:
 
         Damped Newton steps, while the barriers fall to the wanted precision: an interior-point method.
         """
-        links, signed = 10 * self.joints, self._signed
+        links, signed = 10 * self.joints, self.layout.signed
         size = np.sqrt(np.maximum(np.diag(self.gram), SMALLEST))
         x = np.zeros(len(self.gram))
         x[:links] = parameters_of(self.prior.pseudos)
@@ -387,7 +382,7 @@ class _Task:
 
     def _newton(self, x: Array, precision: Array, barrier: float) -> Array:
         """Newton steps for one weight of the barriers."""
-        links, signed = 10 * self.joints, self._signed
+        links, signed = 10 * self.joints, self.layout.signed
         pull = np.linalg.inv(self.prior.pseudos)
         slope = np.einsum("jab,pba->jp", pull, pseudo_inertia_basis())
         each = np.repeat(precision, 10)
@@ -418,7 +413,7 @@ class _Task:
         return x
 
     def _objective(self, x: Array, slope: Array, precision: Array, barrier: float) -> float:
-        links, signed = 10 * self.joints, self._signed
+        links, signed = 10 * self.joints, self.layout.signed
         if np.any(x[signed] <= 0):
             return np.inf
         try:

@@ -5,7 +5,7 @@ the last explanation of a large error: taken back, it has to explain more than t
 explains by chance (`bound.py`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -23,11 +23,19 @@ from problem.regressor import rigid_body_torque
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A reading with logarithms of its held-out errors (joints,): near the simulation's links (None without), free."""
+    """A reading with logarithms of its held-out errors (joints,): near the simulation's links (None without), free.
+
+    The free ones are fitted where they are asked for: a reading that is worse near the links needs none.
+    """
 
     reading: Reading
     near: Array | None
-    free: Array
+    fit_free: Callable[[], Array]
+
+    @cached_property
+    def free(self) -> Array:
+        """With links that the data decide."""
+        return self.fit_free()
 
     @property
     def loss(self) -> float:
@@ -140,13 +148,16 @@ class Judge:
     def trial(self, reading: Reading) -> Trial:
         """The errors of a reading with links near those of the simulation, and free."""
         self.looks[0] += 1
-        scores = self.fitter.scores(reading, self._widths(reading))
-        beyond = self._impossible(reading)
-        losses = [
-            np.log(np.maximum(each.errors, self.tuning.smallest_error)) + each.distance / reading.joints + beyond
-            for each in scores
-        ]
-        return Trial(reading, losses[0] if len(losses) > 1 else None, losses[-1])
+        first, *others = self._widths(reading)
+        strict = self._losses(reading, first)
+        if not others:
+            return Trial(reading, None, lambda: strict)
+        return Trial(reading, strict, lambda: self._losses(reading, others[0]))
+
+    def _losses(self, reading: Reading, width: float) -> Array:
+        (score,) = self.fitter.scores(reading, (width,))
+        errors = np.log(np.maximum(score.errors, self.tuning.smallest_error))
+        return np.asarray(errors + score.distance / reading.joints + self._impossible(reading))
 
     def _widths(self, reading: Reading) -> tuple[float, ...]:
         tuning = self.tuning
@@ -181,6 +192,12 @@ class Judge:
         pairs = zip(self.errors(before.reading), self.errors(after.reading), strict=True)
         return Gain(*(View.between(first, second, smallest) for first, second in pairs))
 
+    def fits_alike(self, other: Trial, best: Trial) -> bool:
+        """Whether the best reading explains not much more than another one, or not surely more."""
+        view, tuning = self.gain(other, best).near, self.tuning
+        unsure = view.gain < tuning.max_rival_gain and view.total_sigmas < tuning.rival_sigmas
+        return view.gain < tuning.rival_gain or unsure
+
     def is_usual(self, trial: Trial) -> bool:
         """Whether no joint leaves more than joints of real arms do."""
         return all(float(each.errors.max()) <= self.tuning.usual_error for each in self.errors(trial.reading))
@@ -201,8 +218,7 @@ class Judge:
 
     def _reaches(self, before: Trial, after: Trial, mistake: Mistake, least: float) -> bool:
         """Whether a reading has so much evidence; where the quick fits do not show most of it, it is not judged."""
-        wanted = least + improbability(mistake, after.reading.joints) / self.fitter.channels.blocks
-        return self.may_explain(before, after, wanted) and self.evidence(before, after, mistake) >= least
+        return self.may_explain(before, after, mistake, least) and self.evidence(before, after, mistake) >= least
 
     def improbability(self, reading: Reading) -> float:
         """Of the last mistake of a reading, nats a block: what it has to explain better than the commonest one."""
@@ -213,17 +229,20 @@ class Judge:
         near, _ = self.errors(trial.reading)
         return float(np.exp(np.mean(np.log(np.maximum(near.errors, self.tuning.smallest_error)))))
 
-    def may_explain(self, before: Trial, after: Trial, least: float | None = None) -> bool:
-        """Whether by the quick fits all joints together, or one, fall nearly so far, and the loss falls.
-
-        least: nats; those of a mistake that is named if left out.
-        """
-        least = self.tuning.least_evidence if least is None else least
+    def may_explain(self, before: Trial, after: Trial, mistake: Mistake, least: float) -> bool:
+        """Whether the quick fits show most of so much evidence (nats), and the loss falls."""
+        if after.loss >= before.loss:
+            return False
         falls = [before.free - after.free]
         if before.near is not None and after.near is not None:
             falls.append(before.near - after.near)
-        most = max(max(float(np.max(each)), float(np.sum(each))) for each in falls)
-        return after.loss < before.loss and most >= QUICK_SHARE * least
+        gains = (
+            [min(float(np.sum(each)), float(np.max(each))) for each in falls]
+            if is_of_one_joint(mistake)
+            else [float(np.sum(each)) for each in falls]
+        )
+        chance = improbability(mistake, after.reading.joints) / self.fitter.channels.blocks
+        return max(gains) >= QUICK_SHARE * (least + chance)
 
     def is_told_by_geometry(self, before: Trial, after: Trial, mistake: Mistake) -> bool:
         """Whether no other links would explain what was recorded as well."""

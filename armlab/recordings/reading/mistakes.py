@@ -4,7 +4,7 @@
 |---|---|
 | torque_sign, joint_direction | each joint, and the torque of all |
 | channel_swap, channel_order | each pair of columns; all columns shifted by one, backwards, or in alphabetical order |
-| encoder_offset | each joint that turns, in steps of 30 degrees, then refined |
+| encoder_offset | each joint that turns, in steps of 45 degrees, then refined |
 | unit_error, gear_ratio | factors between usual units, and ratios of gears |
 | base_tilt, gravity_compensated_torque | gravity along the axes and diagonals, then refined; no gravity |
 | dh_convention, inertia_reference, link_data_error | other meanings of the numbers of the robot file |
@@ -35,7 +35,7 @@ UNIT_FACTORS = {POSITION: (DEGREES, 1 / DEGREES, 1000.0, 1e-3), TORQUE: (1000.0,
 TORQUE_UNITS = (1000.0, 1e-3, 1 / 9.80665, 9.80665, 1 / 1.355818, 1.355818, 8.850746, 1 / 8.850746)
 GEAR_RATIOS = tuple(np.geomspace(5, 300, 83).tolist())
 QUARTERS = (90, 180, -90)
-ZERO_STEPS = tuple(range(-150, 181, 30))  # degrees
+ZERO_STEPS = tuple(range(-135, 181, 45))  # degrees
 
 
 def signs(reading: Reading) -> Iterator[Reading]:

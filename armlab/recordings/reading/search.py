@@ -41,7 +41,7 @@ def find_mistakes(judge: Judge, start: Trial) -> Found:
     if not judge.is_usual(best) and judge.overall_error(start) > tuning.gross_error:
         for first in _distinct(singles, tuning.beam):
             is_taken = first.reading.mistakes == best.reading.mistakes[:1]
-            if is_taken or not judge.may_explain(start, first):
+            if is_taken or first.loss > start.loss - tuning.least_evidence:
                 continue
             other, more = _extend(judge, first, search_singles(judge, first))
             if other is not first and _is_better(other, best, tuning) and judge.is_accepted(start, other):
@@ -70,7 +70,9 @@ def find_mistakes(judge: Judge, start: Trial) -> Found:
 def _is_better(other: Trial, best: Trial, tuning: ReadingTuning) -> bool:
     """Whether a reading explains clearly more, or as much with fewer mistakes."""
     is_simpler = len(other.reading.mistakes) < len(best.reading.mistakes)
-    return other.loss < best.loss - tuning.min_gain or (is_simpler and other.loss <= best.loss + tuning.rival_gain)
+    return other.loss < best.loss - tuning.least_evidence or (
+        is_simpler and other.loss <= best.loss + tuning.rival_gain
+    )
 
 
 def _extend(judge: Judge, trial: Trial, singles: list[Trial]) -> tuple[Trial, list[Trial]]:
@@ -152,10 +154,7 @@ def _rivals(judge: Judge, without: Trial, best: Trial, place: int, singles: list
         name = _name(each.reading.mistakes[-1])
         if each.loss - best.loss > tuning.max_rival_gain or name in out:
             continue
-        view = judge.gain(each, best).near
-        if (view.gain < tuning.rival_gain or view.total_sigmas < tuning.rival_sigmas) and judge.is_accepted(
-            without, each
-        ):
+        if judge.fits_alike(each, best) and judge.is_accepted(without, each):
             out[name] = each
     return tuple(out.values())[1:]
 
@@ -181,7 +180,7 @@ def _undecided(judge: Judge, singles: list[Trial], best: Trial) -> tuple[int, ..
         if mistake.effect != "encoder_offset" or each.loss - best.loss >= judge.tuning.max_rival_gain:
             continue
         is_quarter = abs(abs(mistake.value("offset")) % (np.pi / 2)) < 1e-9
-        if is_quarter and judge.gain(each, best).near.gain < judge.tuning.rival_gain:
+        if is_quarter and judge.fits_alike(each, best):
             out.add(mistake.joint or 0)
     return tuple(sorted(out))
 

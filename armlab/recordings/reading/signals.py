@@ -1,6 +1,6 @@
 """Filtered channels of the identification runs at a few instants, cut into blocks of time.
 
-Readings are looked for on a third of the instants and judged on the others.
+Readings are looked for on a sixth of the instants and judged on the others.
 """
 
 from dataclasses import dataclass, field
@@ -130,15 +130,15 @@ def thin_channels(recording: Recording, tuning: ReadingTuning) -> Rows | None:
         return None
     signals = [differentiate(run, cutoff_hz=_cutoff_hz(run)) for run in map(resample_evenly, runs)]
     return Rows(
-        _channels(recording, signals, tuning, (True, False, False)),
-        _channels(recording, signals, tuning, (False, True, True)),
+        _channels(recording, signals, tuning, SEARCHED),
+        _channels(recording, signals, tuning, tuple(not each for each in SEARCHED)),
     )
 
 
 def _channels(
     recording: Recording, signals: list[Signals], tuning: ReadingTuning, chosen: tuple[bool, ...]
 ) -> Channels:
-    """The channels at every instant of each three that is chosen."""
+    """The channels at every instant of each six that is chosen."""
     given = recording.transmission
     undo, undo_torque = np.linalg.inv(given.position).T, np.linalg.inv(given.torque * given.gains).T
     runs = recording.with_role("identify") or recording.runs
@@ -185,6 +185,7 @@ def _cutoff_hz(run: Run) -> float:
     return min(wanted, MAX_CUTOFF_SHARE * run.rate_hz)
 
 
+SEARCHED = (True, False, False, False, False, False)  # of each six instants
 HARMONICS_KEPT = 5  # of the bandwidth of the motion: what friction at reversals needs
 
 

@@ -96,7 +96,7 @@ def _zeros(judge: Judge, start: Trial) -> list[Trial]:
         best = min(scanned, key=lambda angle: scanned[angle].loss)
         if scanned[best].loss > start.loss - judge.tuning.min_refined_gain and best in table.QUARTERS:
             continue
-        refined = _refine(make, judge, best, 30.0)
+        refined = _refine(make, judge, best, float(table.ZERO_STEPS[1] - table.ZERO_STEPS[0]))
         angle = np.rad2deg(refined.reading.mistakes[-1].value("offset"))
         quarter = (0, *table.QUARTERS)[round(angle / 90) % 4]
         if abs(angle) >= judge.tuning.min_zero_deg and not _is_quarter(judge, scanned.get(quarter), refined, angle):
@@ -116,9 +116,7 @@ def _is_quarter(judge: Judge, turned: Trial | None, refined: Trial, angle: float
     off = abs(_half_turn(angle - np.rad2deg(turned.reading.mistakes[-1].value("offset"))))
     if off < judge.tuning.quarter_tolerance_deg:
         return True
-    view = judge.gain(turned, refined).near
-    doubtful = view.gain < judge.tuning.min_quarter_gain or view.total_sigmas < judge.tuning.rival_sigmas
-    return off < judge.tuning.quarter_reach_deg and doubtful
+    return off < judge.tuning.quarter_reach_deg and judge.fits_alike(turned, refined)
 
 
 def _gravities(judge: Judge, start: Trial) -> list[Trial]:
@@ -150,8 +148,7 @@ def _is_level(judge: Judge, coarse: list[Trial], refined: Trial) -> bool:
     for each in coarse:
         axis = np.array(each.reading.arm.gravity)
         if np.count_nonzero(axis) == 1 and angle_between(own, axis) < judge.tuning.level_reach_deg:
-            view = judge.gain(each, refined).near
-            return view.gain < judge.tuning.min_quarter_gain or view.total_sigmas < judge.tuning.rival_sigmas
+            return judge.fits_alike(each, refined)
     return False
 
 

@@ -11,10 +11,10 @@ class ReadingTuning:
     """How readings of the recording and of the robot file are compared, and when a mistake is named."""
 
     rows: int = tuned(
-        480,
+        720,
         unit="rows",
-        meaning="instants of all runs: on a third of them readings are looked for, on the others they are judged",
-        least=60,
+        meaning="instants of all runs: on a sixth of them readings are looked for, on the others they are judged",
+        least=120,
     )
     blocks: int = tuned(
         20, unit="blocks", meaning="blocks of time of all runs, of which every second is held out", least=4
@@ -79,7 +79,7 @@ class ReadingTuning:
     min_delay_s: float = tuned(
         0.02, unit="s", meaning="torque that is less late is physics", source="the contract of findings", least=1e-4
     )
-    delay_steps: int = tuned(7, unit="values", meaning="delays that are tried each way", least=2)
+    delay_steps: int = tuned(5, unit="values", meaning="delays that are tried each way", least=2)
     max_clock_factor: float = tuned(2.5, meaning="clocks that are tried run so many times too fast or slow", least=1.01)
     min_clock_factor: float = tuned(1.05, meaning="a clock that is less wrong is not looked for", least=1.001)
     clock_steps: int = tuned(13, unit="values", meaning="clocks that are tried", least=3)
@@ -87,7 +87,6 @@ class ReadingTuning:
     little_travel: float = tuned(
         0.1, unit="rad", meaning="a joint that travels less may be read behind its gear, and no reading makes it so"
     )
-    min_gain: float = tuned(0.5, unit="nats", meaning="what two mistakes have to explain beyond the best single one")
     usual_error: float = tuned(
         0.05,
         unit="of the torque's scatter",
@@ -143,7 +142,6 @@ class ReadingTuning:
         unit="deg",
         meaning="a zero so near to a multiple of 90 degrees is that multiple where the data do not tell",
     )
-    min_quarter_gain: float = tuned(0.3, unit="nats", meaning="what tells a zero from a multiple of 90 degrees")
     max_class: int = tuned(
         3,
         unit="rivals",
