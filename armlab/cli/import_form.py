@@ -4,12 +4,13 @@ import shlex
 import shutil
 import textwrap
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import click
 
+from armlab.cli.output import tell_progress
 from armlab.common.errors import InputError
 from armlab.recordings.imports.files import describe_plan
 from armlab.recordings.imports.plan import ImportPlan, plan_import
@@ -26,7 +27,7 @@ def fill_in(files: Sequence[Path], options: Mapping[str, Any]) -> ImportPlan:
 
     Raises InputError for an option of the command that cannot be right, and StoppedError where the user breaks off.
     """
-    read = cache(read_sources)
+    read = cache(partial(read_sources, progress=tell_progress))
 
     def answered(plan: ImportPlan, question: Question, answer: str) -> ImportPlan:
         try:

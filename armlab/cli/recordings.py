@@ -1,13 +1,14 @@
 """Commands `armlab recording ...`: options and messages; heavy imports wait until a command runs."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
 from armlab.cli.options import OutputPath, PagePath, lock_option, tip_option
-from armlab.cli.output import can_ask, prints_result
+from armlab.cli.output import can_ask, prints_result, tell_progress
 from armlab.common.documents import FailedResultError, ResultLines
 
 PUBLIC_RECORDING_NAMES = (
@@ -148,8 +149,10 @@ def import_(files: tuple[Path, ...], **options: Any) -> ResultLines:
     from armlab.cli.import_form import command_of, fill_in
     from armlab.recordings.imports.files import write_plan
     from armlab.recordings.imports.plan import plan_import
+    from armlab.recordings.imports.sources import read_sources
 
-    plan = fill_in(files, options) if can_ask() else plan_import(files, options)
+    read = partial(read_sources, progress=tell_progress)
+    plan = fill_in(files, options) if can_ask() else plan_import(files, options, read)
     imported = write_plan(plan)
     yield from imported.lines
     if plan.options != options:

@@ -91,15 +91,11 @@ def reason_copied(recording: Recording) -> str | None:
     """A run that validates and holds the rows of one that identifies."""
     for judge in recording.with_role("validate"):
         for run in recording.with_role("identify"):
-            rows = np.vstack([_content(run), _content(judge)])
-            copied = duplicated_rows(rows)[run.samples :].mean()
+            both = [np.vstack([run.position, judge.position]), np.vstack([run.torque, judge.torque])]
+            copied = duplicated_rows(both)[run.samples :].mean()
             if copied > MAX_COPIED_SHARE:
                 return (
                     f"{judge.name} validates and holds rows of {run.name}, which identifies ({copied:.0%} of them): "
                     "its errors say nothing of other motion. Give another run, or none."
                 )
     return None
-
-
-def _content(run: Run) -> Array:
-    return np.hstack([run.position, run.torque])

@@ -111,8 +111,11 @@ def repair_run(raw: AnyRun, places: RepairPlaces) -> tuple[AnyRun, ...]:
     measured = drop_bad_rows(raw, places.row_numbers, names)
     single = drop_copied_rows(leave_out(measured, places.entry.exclude))
     rows = single.samples + raw.samples - measured.samples
-    sound = drop_rows_beyond_limits(drop_zero_rows(single), places.joints, places.transmission)
-    clocks = (part_equal_stamps(read_direction_bit(fill_optional_signals(clock))) for clock in cut_into_clocks(sound))
+    sound = drop_rows_beyond_limits(single, places.joints, places.transmission)
+    clocks = (
+        part_equal_stamps(read_direction_bit(fill_optional_signals(drop_zero_rows(clock))))
+        for clock in cut_into_clocks(sound)
+    )
     exclude = places.entry.exclude
     parts = keep_long_parts(tuple(part for clock in clocks for part in cut_at_jumps(clock, exclude)), rows)
     angles = {name: tuple(unit.quantity == "rad" for unit in channels) for name, channels in places.units.items()}

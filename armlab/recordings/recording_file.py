@@ -13,11 +13,12 @@ from pydantic import ConfigDict, Field, model_validator
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.common.files import write_texts
+from armlab.common.files import all_or_none
 from armlab.common.settings import Settings, read_yaml, to_plain_data, validate
 from armlab.recordings.recording import Role
 
 FILE_NAME = "recording.yaml"
+PIECE_ROWS = 100_000  # of a run, that are written at once
 Names = Annotated[tuple[str, ...], Len(min_length=1)]
 Bounded = Annotated[float, Ge(-1e9), Le(1e9)]  # in SI units no arm has a larger number
 Matrix = tuple[tuple[Bounded, ...], ...]
@@ -261,16 +262,33 @@ def write_recording(draft: Draft, folder: Path, beside: Mapping[str, str | bytes
     settings = draft.settings()
     file = validate(RecordingFile, settings, str(folder / FILE_NAME))
     wanted = [name for names in file.columns.signals().values() for name in names]
-    texts = {run.file: _to_csv(run, wanted) for run in draft.runs}
-    write_texts({**texts, **beside, FILE_NAME: _to_yaml(settings, draft.source)}, folder)
+    with all_or_none(folder.absolute()) as place:
+        for run in draft.runs:
+            _write_run(run, wanted, place / run.file)
+        for name, text in {**beside, FILE_NAME: _to_yaml(settings, draft.source)}.items():
+            (place / name).write_bytes(text.encode() if isinstance(text, str) else text)
     return folder
 
 
-def _to_csv(run: DraftRun, wanted: list[str]) -> str:
+def _write_run(run: DraftRun, wanted: list[str], path: Path) -> None:
+    """A run as CSV or Parquet, by its ending, piece by piece."""
     import pandas as pd  # loaded by those who write
 
-    table = pd.DataFrame(run.values, columns=list(run.names))
-    return str(table[wanted].to_csv(index=False, lineterminator="\n"))
+    places = [run.names.index(name) for name in wanted]
+    pieces = (run.values[first : first + PIECE_ROWS, places] for first in range(0, len(run.values), PIECE_ROWS))
+    if path.suffix == ".parquet":
+        import pyarrow as arrow
+        from pyarrow import parquet
+
+        schema = arrow.schema([(name, arrow.float64()) for name in wanted])
+        with parquet.ParquetWriter(path, schema) as writer:
+            for piece in pieces:
+                writer.write_table(arrow.table(list(piece.T.copy()), schema=schema))
+        return
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        stream.write(pd.DataFrame(columns=wanted).to_csv(index=False, lineterminator="\n"))
+        for piece in pieces:
+            pd.DataFrame(piece).to_csv(stream, index=False, header=False, lineterminator="\n")
 
 
 def _to_yaml(settings: dict[str, Any], source: tuple[str, ...]) -> str:

@@ -83,22 +83,7 @@ def drop_zero_rows(run: AnyRun) -> AnyRun:
 
     A signal that comes to rest at zero stays: no joint jumps there. Raises InputError where that is more than a tenth.
     """
-    values = np.column_stack([run.signals[name] for name in required_names(run)])
-    zero = np.all(values == 0, axis=1)
-    if not zero.any() or zero.all():
-        return run
-    there = np.flatnonzero(~zero)
-    before = np.searchsorted(there, np.flatnonzero(zero)) - 1
-    sides = (
-        run.position[there[np.clip(before, 0, None)]],
-        run.position[there[np.clip(before + 1, None, len(there) - 1)]],
-    )
-    usual = (
-        np.quantile(np.abs(np.diff(run.position[there], axis=0)), USUAL_STEP_SHARE, axis=0) if len(there) > 1 else 0.0
-    )
-    jumps = np.any(np.minimum(*np.abs(sides)) > MAX_USUAL_STEPS * usual, axis=1)
-    bad = zero.copy()
-    bad[zero] = jumps
+    bad = find_zero_rows(np.column_stack([run.signals[name] for name in required_names(run)]))
     if not bad.any():
         return run
     first = f"first at {run.time[bad][0]:g} s"
@@ -106,6 +91,25 @@ def drop_zero_rows(run: AnyRun) -> AnyRun:
     if bad.sum() > MAX_LOST_SHARE * len(bad):
         raise InputError(f"{run.file}: {text}: does another driver write into the log? Export the arm's rows alone")
     return run.rows(~bad).with_findings(Finding("bad_value", "repaired", f"{text}; left out"))
+
+
+def find_zero_rows(values: Array) -> NDArray[np.bool_]:
+    """Rows that hold zeros alone where a column jumps to zero and back; values: (rows, columns), NaN where empty."""
+    known = np.isfinite(values)
+    zero = np.all((values == 0) | ~known, axis=1) & known.any(axis=1)
+    found = np.zeros(len(values), dtype=bool)
+    if not zero.any() or zero.all():
+        return found
+    for column, filled in zip(values.T, known.T, strict=True):
+        own = np.flatnonzero(filled)
+        there, gone = np.flatnonzero(~zero[own]), np.flatnonzero(zero[own])
+        if len(there) < 2 or not len(gone):
+            continue
+        signal = column[own][there]
+        usual = np.quantile(np.abs(np.diff(signal)), USUAL_STEP_SHARE)
+        after = np.clip(np.searchsorted(there, gone), 1, len(there) - 1)
+        found[own[gone]] |= np.minimum(np.abs(signal[after - 1]), np.abs(signal[after])) > MAX_USUAL_STEPS * usual
+    return found
 
 
 def drop_rows_beyond_limits(run: AnyRun, joints: Sequence[Joint], transmission: Transmission) -> AnyRun:
@@ -141,21 +145,29 @@ def drop_rows_beyond_limits(run: AnyRun, joints: Sequence[Joint], transmission: 
 
 def drop_copied_rows(run: AnyRun) -> AnyRun:
     """Leaves out rows that are equal to an earlier one, stamp and all: written twice, they are one measurement."""
-    table = np.column_stack([run.time, *run.signals.values()])
-    keys = np.nan_to_num(table, nan=np.inf) + 0.0  # of -0.0 and 0.0
-    same = duplicated_rows(keys)
+    same = duplicated_rows([run.time, *run.signals.values()])
     if not same.any():
         return run
     text = f"{same.sum()} rows repeat an earlier one, stamp and all (first at {run.time[same][0]:g} s); left out"
     return run.rows(~same).with_findings(Finding("duplicate_row", "repaired", text))
 
 
-def duplicated_rows(table: Array) -> NDArray[np.bool_]:
-    """Which rows are equal to an earlier one; table: (rows, columns) of finite numbers."""
-    whole = np.ascontiguousarray(table).view(np.dtype((np.void, table.dtype.itemsize * table.shape[1]))).ravel()
-    first = np.unique(whole, return_index=True)[1]
-    same = np.ones(len(table), dtype=bool)
-    same[first] = False
+def duplicated_rows(signals: Sequence[Array]) -> NDArray[np.bool_]:
+    """Which rows are equal to an earlier one; a missing number equals another. signals: (rows,) or (rows, columns).
+
+    Rows are compared by a hash first, so that memory holds one number a row.
+    """
+    import pandas as pd
+
+    columns = [column for signal in signals for column in (signal[:, None] if signal.ndim == 1 else signal).T]
+    keys = np.zeros(len(columns[0]), dtype=np.uint64)
+    for column in columns:
+        keys = keys * np.uint64(0x9E3779B97F4A7C15) + pd.util.hash_array(column + 0.0)  # -0.0 equals 0.0
+    suspects = np.flatnonzero(pd.Series(keys).duplicated(keep=False))
+    same = np.zeros(len(keys), dtype=bool)
+    if len(suspects):
+        rows = pd.DataFrame({place: column[suspects] for place, column in enumerate(columns)})
+        same[suspects] = rows.duplicated()
     return same
 
 

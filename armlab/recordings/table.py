@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -87,18 +88,26 @@ def check_column_count(columns: int, path: Path) -> None:
         raise InputError(f"{path} has {columns} columns; at most {MAX_COLUMNS} can be read: is it transposed?")
 
 
+def has_parquet() -> bool:
+    """Whether Parquet can be read and written here."""
+    return find_spec("pyarrow") is not None
+
+
 def _read_parquet(path: Path) -> Table:
+    """Column by column, so that memory holds the numbers once."""
     try:
         import pyarrow as arrow
         from pyarrow import parquet
     except ImportError:
         raise InputError(f"{path}: to read Parquet install pyarrow: pip install 'armlab[recordings]'") from None
     try:
-        columns = parquet.read_table(path)
-        names = tuple(str(name) for name in columns.column_names)
-        values = [column.cast(arrow.float64()).to_numpy(zero_copy_only=False) for column in columns.columns]
-    except (arrow.ArrowException, OSError) as error:
+        with parquet.ParquetFile(path) as file:
+            names = tuple(file.schema_arrow.names)
+            rows = file.metadata.num_rows
+            values = np.empty((rows, len(names)))
+            for place, name in enumerate(names):
+                column = file.read(columns=[name])
+                values[:, place] = column.columns[0].cast(arrow.float64()).to_numpy(zero_copy_only=False)
+    except (arrow.ArrowException, OSError, IndexError) as error:
         raise InputError(f"cannot read {path} as Parquet: {' '.join(str(error).split())[:200]}") from None
-    rows = columns.num_rows
-    table = np.column_stack(values) if values else np.empty((rows, 0))
-    return Table(path.name, names, table, HEADER_LINES + 1 + np.arange(rows))
+    return Table(path.name, names, values, HEADER_LINES + 1 + np.arange(rows))

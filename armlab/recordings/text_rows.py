@@ -5,7 +5,7 @@ import csv
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 
@@ -19,7 +19,21 @@ from armlab.recordings.recording import Finding
 MAX_TEXT_BYTES = 10 * 10**9  # a text of this size is read for minutes
 NO_NUMBER = ("", "nan", "null", "none", "na", "n/a")  # cells that stand for a number that is missing, in lower case
 PIECE_BYTES, PIECE_LINES = 1 << 20, 20_000
+TOLD_LINES = 100_000
+Progress = Callable[[str], None]
 NumberedLine = tuple[int, str]  # number in the file, from 1, and text with its line end
+
+
+def silent(message: str) -> None:
+    """For readers whom nobody watches."""
+
+
+def tell_lines(lines: Iterable[NumberedLine], name: str, progress: Progress) -> Iterator[NumberedLine]:
+    """The lines; progress is told how many were read."""
+    for number, line in lines:
+        if number % TOLD_LINES == 0:
+            progress(f"{name}: {number:,} rows read")
+        yield number, line
 
 
 @contextmanager
@@ -97,7 +111,8 @@ def read_rows(lines: Iterable[NumberedLine], layout: RowLayout, where: str) -> R
 
     Raises InputError for a row of the wrong length before the last.
     """
-    parts, kept, findings = [], iter(lines), tuple[Finding, ...]()
+    values, count = np.empty((PIECE_LINES, layout.width)), 0
+    parts, kept, findings = list[Rows](), iter(lines), tuple[Finding, ...]()
     piece = list(islice(kept, PIECE_LINES))
     while piece:
         following = list(islice(kept, PIECE_LINES))
@@ -105,12 +120,17 @@ def read_rows(lines: Iterable[NumberedLine], layout: RowLayout, where: str) -> R
         if not following:
             rows, findings = _drop_broken_last(rows, layout, where)
         if rows:
-            parts.append(_parse_piece(rows, layout, where))
+            part = _parse_piece(rows, layout, where)
+            if count + len(part.values) > len(values):
+                values.resize((2 * len(values), layout.width), refcheck=False)  # what is not written takes no memory
+            values[count : count + len(part.values)] = part.values
+            count += len(part.values)
+            parts.append(replace(part, values=part.values[:0]))
         piece = following
     if not parts:
         none = np.empty(0, dtype=np.intp)
         return Rows(np.empty((0, layout.width)), {}, none, np.zeros(layout.width, dtype=np.intp), findings)
-    values = np.concatenate([part.values for part in parts])
+    values.resize((count, layout.width), refcheck=False)
     texts = {column: np.concatenate([part.texts[column] for part in parts]) for column in layout.texts}
     numbers = np.concatenate([part.numbers for part in parts])
     return Rows(values, texts, numbers, np.sum([part.words for part in parts], axis=0), findings)

@@ -19,7 +19,9 @@ from armlab.recordings.load import load_recording
 from armlab.recordings.motion import is_motion_only, load_motion_recording
 from armlab.recordings.recording import MotionRun, Role
 from armlab.recordings.recording_file import Draft, DraftRun, Keys, write_recording
+from armlab.recordings.table import has_parquet
 
+MAX_CSV_NUMBERS = 5_000_000  # of a run; a larger one is written as Parquet, a hundredth of the time and half the size
 MAX_LISTED_COLUMNS = 3  # of a signal; of more, numbered in a row, the first and the last are named
 
 
@@ -97,7 +99,9 @@ def write_plan(plan: ImportPlan) -> ImportedRecording:
     runs = []
     for path, source in plan.sources.items():
         role: Role = "validate" if path in validate else "identify"
-        runs.append(DraftRun(_run_file(path, plan.sources), role, wanted, source.table.columns(wanted, "import")))
+        suffix = ".parquet" if len(source.table.values) * len(wanted) > MAX_CSV_NUMBERS and has_parquet() else ".csv"
+        name = f"{_run_file(path, plan.sources)}{suffix}"
+        runs.append(DraftRun(name, role, source.table.names, source.table.values))
     columns: Keys = {signal: names[0] if signal == "time" else names for signal, names in plan.columns.items()}
     others = {
         **({"gains": list(plan.gains)} if plan.gains else {}),
@@ -206,11 +210,11 @@ def _describe_source(source: Source) -> str:
 
 
 def _run_file(path: str, paths: Iterable[str]) -> str:
-    """The name of a run: that of its file, with its folder's where two files have one name."""
+    """The name of a run without ending: that of its file, with its folder's where two files have one name."""
     own = _bare_name(path)
     alike = sum(_bare_name(each) == own for each in paths)
     place = list(paths).index(path) + 1
-    return f"{own}.csv" if alike == 1 else f"{Path(path).resolve().parent.name}-{own}-{place}.csv"
+    return own if alike == 1 else f"{Path(path).resolve().parent.name}-{own}-{place}"
 
 
 def _bare_name(path: str) -> str:

@@ -16,9 +16,17 @@ from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.recordings.clock import MAX_BRIDGED_GAP
 from armlab.recordings.recording import Finding
-from armlab.recordings.repair import MAX_LOST_SHARE
+from armlab.recordings.repair import (
+    BEYOND_LIMITS,
+    MAX_LOST_SHARE,
+    MAX_USUAL_STEPS,
+    USUAL_SHARE,
+    USUAL_STEP_SHARE,
+    find_zero_rows,
+)
 from armlab.recordings.table import Table
 
+EDGE_ROWS = 2  # of a clock, before and after which the other signal has no row
 SMOOTH_SIGNALS = ("position", "link_position", "velocity")
 
 
@@ -39,12 +47,25 @@ def put_on_common_stamps(table: Table, columns: Mapping[str, Sequence[str]], tim
     """
     stamps = table.columns(columns["time"], "time")[:, 0]
     wanted = [(signal, name) for signal, names in columns.items() if signal != "time" for name in names]
-    values = table.columns([name for _, name in wanted], "import")
-    whole = np.isfinite(values).all(axis=1) & np.isfinite(stamps)
-    if whole.sum() >= (1 - MAX_LOST_SHARE) * len(values):
+    whole = np.isfinite(stamps)
+    for _, name in wanted:
+        whole &= np.isfinite(table.columns([name], "import")[:, 0])
+    if whole.sum() >= (1 - MAX_LOST_SHARE) * len(whole):
         return table
+    values = table.columns([name for _, name in wanted], "import")
     stamped = np.flatnonzero(np.isfinite(stamps))
+    odd = _far_beyond(values)
+    values[odd] = np.nan
+    empty = find_zero_rows(values[stamped])
+    others = f"; {empty.sum()} rows hold zeros alone, between rows that do not, and are left out" if empty.any() else ""
+    others += f"; {odd.sum()} values are far beyond all others and left out" if odd.any() else ""
+    stamped = stamped[~empty]
     time, values = stamps[stamped], values[stamped]
+    if np.sum(np.diff(time) < 0) > MAX_LOST_SHARE * len(time):
+        raise InputError(
+            f"{table.file}: signals stand in rows of their own, and the rows in no order of time: sort them by their "
+            "stamps"
+        )
     counts = np.isfinite(values).sum(axis=0)
     few = counts <= (1 + MAX_LOST_SHARE) * counts.min()
     # of columns that come as rarely, the torque keeps its stamps: positions are smooth, it has noise and steps
@@ -54,11 +75,11 @@ def put_on_common_stamps(table: Table, columns: Mapping[str, Sequence[str]], tim
     parts = [_interpolate(time, values, clock, slowest, orders) for clock in clocks]
     rows = np.concatenate([part.rows for part in parts])
     slow = wanted[slowest]
-    if not len(rows):
+    if len(rows) < (1 - MAX_LOST_SHARE) * counts[slowest] - len(clocks) * EDGE_ROWS:
         other = wanted[int(np.argmax(counts))]
         raise InputError(
-            f"{table.file}: {slow[1]} ({slow[0]}) and {other[1]} ({other[0]}) stand in different rows, which never "
-            "come close to each other in time"
+            f"{table.file}: {slow[1]} ({slow[0]}) and {other[1]} ({other[0]}) stand in different rows, and only "
+            f"{len(rows)} of {counts[slowest]} are close to each other in time: export them with common stamps"
         )
     out = table.values[stamped[rows]].copy()
     places = [table.names.index(name) for _, name in wanted]
@@ -70,7 +91,7 @@ def put_on_common_stamps(table: Table, columns: Mapping[str, Sequence[str]], tim
     listed = ", ".join(f"{signal} {count}" for signal, count in most.items())
     text = (
         f"signals come in rows of their own ({listed} of {len(table.values)} rows): all put on {len(rows)} stamps of "
-        f"{slow[1]} by interpolation, from rows up to {1e3 * lag:.3g} ms away on average"
+        f"{slow[1]} by interpolation, from rows up to {1e3 * lag:.3g} ms away on average{others}"
     )
     finding = Finding("several_rates", "note", text)
     return replace(
@@ -79,6 +100,21 @@ def put_on_common_stamps(table: Table, columns: Mapping[str, Sequence[str]], tim
         row_numbers=table.row_numbers[stamped[rows]],
         findings=(*table.findings, finding),
     )
+
+
+def _far_beyond(values: Array) -> NDArray[np.bool_]:
+    """Single values far beyond those of their column, from which no number can be made for other rows."""
+    found = np.zeros(values.shape, dtype=bool)
+    for place, column in enumerate(values.T):
+        own = np.flatnonzero(np.isfinite(column))
+        if len(own) <= 2:
+            continue
+        size = np.abs(column[own])
+        steps = np.abs(np.diff(column[own]))
+        jumps = steps > MAX_USUAL_STEPS * np.quantile(steps, USUAL_STEP_SHARE)
+        alone = np.append(True, jumps) & np.append(jumps, True)
+        found[own, place] = alone & (size > BEYOND_LIMITS * np.quantile(size, USUAL_SHARE))
+    return found
 
 
 def _interpolate(time: Array, values: Array, clock: NDArray[np.intp], slowest: int, orders: Sequence[int]) -> OnStamps:

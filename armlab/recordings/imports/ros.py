@@ -5,8 +5,9 @@ the times of the states; joints that have a topic each are put on the times of t
 """
 
 import struct
+from array import array
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,6 @@ from armlab.recordings.imports.ros_messages import (
     DEFINITIONS,
     SINGLE_STATE,
     STATE_TYPES,
-    JointMessage,
     Parser,
     parse_command,
     parse_state,
@@ -29,7 +29,9 @@ from armlab.recordings.imports.ros_messages import (
 )
 from armlab.recordings.recording import Finding
 from armlab.recordings.table import Table
+from armlab.recordings.text_rows import Progress, silent
 
+TOLD_MESSAGES = 50_000
 BAG_READ_ERRORS = (
     ValueError,
     TypeError,
@@ -61,7 +63,13 @@ class Series:
     foreign: int = 0
 
 
-def read_bag(path: Path, topic: str | None = None, commands: str | None = None, joints: Sequence[str] = ()) -> Table:
+def read_bag(
+    path: Path,
+    topic: str | None = None,
+    commands: str | None = None,
+    joints: Sequence[str] = (),
+    progress: Progress = silent,
+) -> Table:
     """Columns `t` (s, from the first state) and `position_`, `velocity_`, `effort_`, `command_` plus the joint's name.
 
     path: a .db3, .mcap or .bag file, or the folder of a ROS 2 bag. topic: of the states, needed if several topics carry
@@ -69,7 +77,7 @@ def read_bag(path: Path, topic: str | None = None, commands: str | None = None, 
     joints. The stamps are those of the headers, or the times of recording where the headers have none. Values that a
     message leaves out are NaN. Raises InputError for a file that is not a bag, and for topics that it does not have.
     """
-    states, command = _read_series(path, topic, commands, joints)
+    states, command = _read_series(path, topic, commands, joints, progress)
     if not all(len(series.times) for series in states):
         raise InputError(f"{path} holds no joint states")
     if command is not None and not len(command.times):
@@ -100,7 +108,7 @@ def read_bag(path: Path, topic: str | None = None, commands: str | None = None, 
 
 
 def _read_series(
-    path: Path, topic: str | None, commands: str | None, joints: Sequence[str]
+    path: Path, topic: str | None, commands: str | None, joints: Sequence[str], progress: Progress
 ) -> tuple[list[Series], Series | None]:
     """The states, one series a topic, and the commands."""
     try:
@@ -127,12 +135,12 @@ def _read_series(
             if commands is not None:
                 _check_topic(reader, commands, COMMAND_TYPES, "commands", path)
             topics = _state_topics(reader, topic, commands, path)
-            states = [_read_topic(reader, each, parse_state, joints) for each in topics]
+            states = [_read_topic(reader, each, parse_state, joints, progress) for each in topics]
             if commands is None:
                 return states, None
             if any(name.startswith("command_") for series in states for name in series.names):
                 raise InputError(f"the states on {topics[0]} hold the commands: leave out --command-topic")
-            return states, _read_topic(reader, commands, parse_command, joints)
+            return states, _read_topic(reader, commands, parse_command, joints, progress)
     except (AnyReaderError, Ros1Error, Ros2Error, SerdeError, SqliteError, *BAG_READ_ERRORS) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"cannot read {path} as a bag of joint states: {reason[:200]}") from None
@@ -163,40 +171,59 @@ def _check_topic(reader: Any, wanted: str, types: Sequence[str], what: str, path
         raise InputError(f"no {what} on topic '{wanted}' in {path}: {suggest_name(wanted, topics)}")
 
 
-def _read_topic(reader: Any, topic: str, parse: Parser, joints: Sequence[str]) -> Series:
+@dataclass(frozen=True, eq=False)
+class _Kind:
+    """Messages of one topic that hold the same names. values: one after the other; places: of the messages."""
+
+    of_robot: bool
+    values: "array[float]" = field(default_factory=lambda: array("d"))
+    places: "array[int]" = field(default_factory=lambda: array("q"))
+
+
+def _read_topic(reader: Any, topic: str, parse: Parser, joints: Sequence[str], progress: Progress) -> Series:
+    """The messages of a topic; those without a joint of the robot are left out where others have one."""
     links = [link for link in reader.connections if link.topic == topic]
-    messages, foreign = list[JointMessage](), 0
-    for link, recorded, raw in reader.messages(connections=links):
+    kinds, recorded, stamps = dict[tuple[str, ...], _Kind](), array("q"), array("q")
+    for place, (link, time, raw) in enumerate(reader.messages(connections=links)):
         message = reader.deserialize(raw, link.msgtype)
-        held = parse(message, link.msgtype, topic, joints)
-        if joints and not any(name.endswith(f"_{joint}") for name in held for joint in joints):
-            foreign += 1
-            continue
-        messages.append(JointMessage(recorded, stamp_of(message), held))
-    if foreign and not messages:
-        raise InputError(f"{topic} names none of the robot's joints ({', '.join(joints)}): is it another robot's?")
-    names = tuple(dict.fromkeys(name for message in messages for name in message.values))
-    values = np.array([[message.values.get(name, np.nan) for name in names] for message in messages])
-    recorded = np.array([message.recorded for message in messages], dtype=np.int64)
-    stamps = np.array([message.stamp for message in messages], dtype=np.int64)
-    stamped = bool(len(stamps)) and bool(np.any(stamps != stamps[0]))
-    delay = int(np.median(recorded - stamps)) if stamped else None
-    times = stamps if stamped else recorded
-    return Series(names, *_join_messages(times, values.reshape(len(messages), len(names))), delay, foreign)
+        numbers = parse(message, link.msgtype, topic, joints)
+        if place % TOLD_MESSAGES == TOLD_MESSAGES - 1:
+            progress(f"{topic}: {place + 1:,} messages read")
+        names = tuple(numbers)
+        if names not in kinds:
+            kinds[names] = _Kind(any(name.endswith(f"_{joint}") for name in names for joint in joints))
+        kinds[names].values.extend(numbers.values())
+        kinds[names].places.append(place)
+        recorded.append(time)
+        stamps.append(stamp_of(message))
+    own = {names: kind for names, kind in kinds.items() if kind.of_robot} or kinds  # else listed by hand
+    names = tuple(dict.fromkeys(name for held in own for name in held))
+    values, of_robot = np.full((len(recorded), len(names)), np.nan), np.zeros(len(recorded), dtype=bool)
+    for held, kind in own.items():
+        places = np.frombuffer(kind.places, dtype=np.int64)
+        columns = [names.index(name) for name in held]
+        values[places[:, None], columns] = np.frombuffer(kind.values).reshape(len(places), len(held))
+        of_robot[places] = True
+    written, told = np.array(recorded, dtype=np.int64), np.array(stamps, dtype=np.int64)
+    stamped = bool(len(told)) and bool(np.any(told != told[0]))
+    delay = int(np.median(written - told)) if stamped else None
+    if not of_robot.all():
+        written, told, values = written[of_robot], told[of_robot], values[of_robot]
+    times, joined = _join_messages(told if stamped else written, values)
+    return Series(names, times, joined, delay, int((~of_robot).sum()))
 
 
 def _join_messages(times: NDArray[np.int64], values: Array) -> tuple[NDArray[np.int64], Array]:
     """One row for messages in a row with one stamp that hold different joints."""
     if not np.isnan(values).any():
         return times, values
-    joined_times, joined = list[int](), list[Array]()
-    for time, row in zip(times.tolist(), values, strict=True):
-        if joined and time == joined_times[-1] and np.all(np.isnan(joined[-1]) | np.isnan(row)):
-            joined[-1] = np.where(np.isnan(row), joined[-1], row)
-        else:
-            joined_times.append(time)
-            joined.append(row)
-    return np.array(joined_times, dtype=np.int64), np.array(joined)
+    joined = values.copy()
+    first = np.ones(len(times), dtype=bool)
+    for row in np.flatnonzero(np.diff(times) == 0) + 1:
+        if np.all(np.isnan(joined[row - 1]) | np.isnan(joined[row])):
+            joined[row] = np.where(np.isnan(joined[row]), joined[row - 1], joined[row])
+            first[row - 1] = False
+    return times[first], joined[first]
 
 
 def _on_times(series: Series, times: NDArray[np.int64]) -> Array:

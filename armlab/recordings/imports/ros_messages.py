@@ -12,7 +12,6 @@ Definitions: control_msgs 4.8.0 (Humble), for bags that do not bring their own.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from armlab.common.errors import InputError
@@ -46,15 +45,6 @@ DEFINITIONS = {
         ]
     ),
 }
-
-
-@dataclass(frozen=True, eq=False)
-class JointMessage:
-    """One message: time of recording and stamp of its header, ns (0 without one), and values by column name."""
-
-    recorded: int
-    stamp: int
-    values: dict[str, float]
 
 
 def parse_state(message: Any, kind: str, topic: str, joints: Sequence[str]) -> dict[str, float]:

@@ -20,6 +20,7 @@ from armlab.recordings.imports.packed import PACKED_SUFFIXES, unpacked
 from armlab.recordings.imports.ros import read_bag
 from armlab.recordings.imports.text import read_odd_csv
 from armlab.recordings.table import Table
+from armlab.recordings.text_rows import Progress, silent
 
 BAG_SUFFIXES = (".db3", ".mcap", ".bag")
 TEXT_SUFFIXES = (".csv", ".txt", ".dat", ".tsv", ".log", ".asc")
@@ -75,14 +76,15 @@ class Source:
         return tuple(name.removeprefix(prefix) for name in self.table.names if name.startswith(prefix))
 
 
-def read_sources(path: Path, options: ReadOptions) -> dict[str, Source]:
+def read_sources(path: Path, options: ReadOptions, progress: Progress = silent) -> dict[str, Source]:
     """The content of a path by the paths of its runs: several for a LeRobot dataset, which holds episodes.
 
+    progress: is told how far the reading of a large file is.
     Raises InputError for an unknown format and a broken file, and UndecidedError where an option has to choose.
     """
     dataset = dataset_of(path) if path.suffix.lower() == ".parquet" else None
     if dataset is None and not is_lerobot(path):
-        return {str(path): _read_source(path, options)}
+        return {str(path): _read_source(path, options, progress)}
     found = read_lerobot(path) if dataset is None else read_lerobot(dataset, path)
     return {
         str(path / name): Source(
@@ -98,15 +100,15 @@ def read_sources(path: Path, options: ReadOptions) -> dict[str, Source]:
     }
 
 
-def _read_source(path: Path, options: ReadOptions) -> Source:
+def _read_source(path: Path, options: ReadOptions, progress: Progress) -> Source:
     if not path.exists():
         raise InputError(f"no file {path}")
     suffix = path.suffix.lower()
     if suffix in PACKED_SUFFIXES:
         with unpacked(path) as inside:
-            return _read_source(inside, options)
+            return _read_source(inside, options, progress)
     if suffix in BAG_SUFFIXES or path.is_dir():
-        table = read_bag(path, options.topic, options.commands, options.joints)
+        table = read_bag(path, options.topic, options.commands, options.joints, progress)
         note = "joint states; rad, rad/s and N.m by ROS convention"
         return Source(table, _bag_units(table), note, BAG_PREFIXES, reason="as in ROS messages")
     if suffix == ".mat":
@@ -118,7 +120,7 @@ def _read_source(path: Path, options: ReadOptions) -> Source:
     if suffix == ".npz":
         return Source(read_npz(path), {}, "NumPy arrays")
     if suffix in TEXT_SUFFIXES:
-        text = read_odd_csv(path, options.separator, options.decimal)
+        text = read_odd_csv(path, options.separator, options.decimal, progress)
         read = "".join(f"; {name} is {words}, from the first row" for name, words in text.stamps.items())
         return Source(text.table, text.units, f"{text.layout}{read}", stamps=text.stamps, reason="from the header")
     known = ", ".join((".mat", ".npz", *FRAME_READERS, *BAG_SUFFIXES, *TEXT_SUFFIXES))

@@ -16,11 +16,14 @@ from armlab.recordings.table import Table, check_column_count
 from armlab.recordings.text_rows import (
     NO_NUMBER,
     NumberedLine,
+    Progress,
     RowLayout,
     open_lines,
     parse_numbers,
     read_rows,
+    silent,
     split_line,
+    tell_lines,
 )
 
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "blank"}
@@ -76,7 +79,9 @@ class Sample:
         return len(self.data) + (self.width - len(self.texts)) / (self.width + 1) if self.width > 1 else 0.0
 
 
-def read_odd_csv(path: Path, separator: str | None = None, decimal: str | None = None) -> TextTable:
+def read_odd_csv(
+    path: Path, separator: str | None = None, decimal: str | None = None, progress: Progress = silent
+) -> TextTable:
     """The columns of a text file with numbers; without a header they are called c1, c2, ...
 
     A column without any number becomes NaN, but for stamps as text, which become seconds. separator, decimal: found in
@@ -95,7 +100,7 @@ def read_odd_csv(path: Path, separator: str | None = None, decimal: str | None =
         formats = _stamp_formats(sample)
         first = sample.rows[sample.data[0]][0]
         rows = read_rows(
-            chain((each for each in head if each[0] >= first), lines),
+            tell_lines(chain((each for each in head if each[0] >= first), lines), path.name, progress),
             RowLayout(
                 layout.separator,
                 sample.width,
