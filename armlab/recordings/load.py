@@ -109,10 +109,12 @@ def repair_run(raw: AnyRun, places: RepairPlaces) -> tuple[AnyRun, ...]:
     columns = places.file.columns
     names = columns.signals() | {"torque": columns.torque or columns.current or ()}
     measured = drop_bad_rows(raw, places.row_numbers, names)
-    single = drop_copied_rows(leave_out(measured, places.entry.exclude))
-    rows = single.samples + raw.samples - measured.samples
+    chosen = leave_out(measured, places.entry.exclude)
+    filled = drop_zero_rows(chosen)
+    single = drop_copied_rows(filled)
+    rows = single.samples + raw.samples - measured.samples + chosen.samples - filled.samples
     sound = drop_rows_beyond_limits(single, places.joints, places.transmission)
-    clocks = (
+    clocks = (  # rows of zeros show again where rows were in no order
         part_equal_stamps(read_direction_bit(fill_optional_signals(drop_zero_rows(clock))))
         for clock in cut_into_clocks(sound)
     )
