@@ -88,7 +88,7 @@ def change_table(table: pd.DataFrame, rows: int, change: str, rng: np.random.Gen
     """The table after a change, and how many rows of measurement it then has."""
     out, size = table.copy(), len(table)
     order = np.arange(size)
-    place = int(rng.integers(100, size - 200))
+    place = int(rng.integers(50, size - 60))
     if change == "swap rows":
         for at in rng.integers(1, size - 1, 5):
             order[[at, at - 1]] = order[[at - 1, at]]
