@@ -157,6 +157,13 @@ def numbers(messages: list[Message]) -> list[Message]:
     return [*messages, (START, "/goal", kind, TYPES[kind](layout, np.zeros(3)))]
 
 
+def with_commands_beside(messages: list[Message]) -> list[Message]:
+    return [
+        (START, "/arm/state", TRAJECTORY_STATE, trajectory_state(START, JOINTS, COMMAND[0], POSITION[0])),
+        *(numbers([])),
+    ]
+
+
 def no_reference(messages: list[Message]) -> list[Message]:
     content = trajectory_state(START, JOINTS, [], POSITION[0])
     return [(START, "/arm/state", TRAJECTORY_STATE, content)]
@@ -166,6 +173,7 @@ def no_reference(messages: list[Message]) -> list[Message]:
     ("change", "options", "reason"),
     [
         (lambda each: each, {"command_topic": "/comands"}, "no commands on topic '/comands'"),
+        (with_commands_beside, {"command_topic": "/goal"}, "the states on /arm/state hold the commands"),
         (several_points, {"command_topic": "/goal"}, "sends trajectories of 2 points"),
         (
             numbers,

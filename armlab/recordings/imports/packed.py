@@ -28,16 +28,7 @@ def unpacked(path: Path) -> Iterator[Path]:
                 inside = inside.with_suffix(own if own not in ("", ".zip") else ".csv")
             with _open(path) as packed, inside.open("wb") as out:
                 shutil.copyfileobj(packed, out)
-        except (
-            OSError,
-            EOFError,
-            ValueError,
-            RuntimeError,
-            NotImplementedError,
-            zlib.error,
-            lzma.LZMAError,
-            zipfile.BadZipFile,
-        ) as error:
+        except _unpack_errors() as error:
             raise InputError(f"cannot unpack {path}: {' '.join(str(error).split())[:200]}") from None
         try:
             yield inside
@@ -59,10 +50,17 @@ def _open(path: Path) -> IO[bytes] | Any:
         import zstandard
     except ImportError:
         raise InputError(f"{path}: to unpack it install rosbags: pip install 'armlab[recordings]'") from None
+    return zstandard.open(path, "rb")
+
+
+def _unpack_errors() -> tuple[type[Exception], ...]:
+    """What the unpackers raise for a damaged file."""
+    known = (OSError, EOFError, ValueError, RuntimeError, zlib.error, lzma.LZMAError, zipfile.BadZipFile)
     try:
-        return zstandard.open(path, "rb")
-    except zstandard.ZstdError as error:
-        raise InputError(f"cannot unpack {path}: {error}") from None
+        import zstandard
+    except ImportError:
+        return known
+    return (*known, zstandard.ZstdError)
 
 
 def _only_name(path: Path) -> str:
