@@ -137,7 +137,8 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
 def import_(files: tuple[Path, ...], **options: Any) -> ResultLines:
     """Convert files of other formats.
 
-    Reads .mat, ROS bags, MCAP, Parquet, CSV of any layout and LeRobot datasets, and writes a new recording folder.
+    Reads .mat, .npz, ROS bags, MCAP, Parquet, JSON, CSV of any layout and LeRobot datasets, packed or not, and writes
+    a new recording folder.
     Without --torque, --reference-position makes a recording of motion only, and
     so does a bag with the states of a controller or with --command-topic.
 
