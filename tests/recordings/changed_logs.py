@@ -29,6 +29,7 @@ from armlab.recordings.recording import Run
 
 SECONDS, CUTOFF_HZ = 8.0, 5.0
 EPISODES = 4
+TOLD_LOGS = 250
 MAX_LOST = 0.1  # of the rows that are measurements
 OPTIONS = {
     **dict.fromkeys(("tip", "gains", "gear_ratio", "motor_side", "joints", "separator", "decimal", "topic"), None),
@@ -226,6 +227,8 @@ def main(arguments: list[str]) -> int:
     options = parser.parse_args(arguments)
     counts, started = Counter[str](), time.monotonic()
     for seed in range(options.first, options.first + options.logs):
+        if counts.total() % TOLD_LOGS == TOLD_LOGS - 1:
+            print(f"{counts.total() + 1} logs: {dict(counts)}", flush=True)
         log, judged = judge_seed(seed)
         judge_seed.cache_clear()
         counts[judged.outcome] += 1
