@@ -87,6 +87,7 @@ def load_runs(recording: Recording, file: RecordingFile, entry: RunEntry) -> tup
     table = read_table(recording.folder / entry.file)
     run = make_raw_run(table, file, entry, units)
     places = RepairPlaces(table.row_numbers, file, entry, units, recording.arm.joints, recording.transmission)
+    del table  # of a large log, its numbers are as much memory as the run
     return tuple(
         take_timing_back(part, file.timing, str(recording.folder / FILE_NAME)) for part in repair_run(run, places)
     )

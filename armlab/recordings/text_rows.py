@@ -111,7 +111,6 @@ def read_rows(lines: Iterable[NumberedLine], layout: RowLayout, where: str) -> R
 
     Raises InputError for a row of the wrong length before the last.
     """
-    values, count = np.empty((PIECE_LINES, layout.width)), 0
     parts, kept, findings = list[Rows](), iter(lines), tuple[Finding, ...]()
     piece = list(islice(kept, PIECE_LINES))
     while piece:
@@ -120,17 +119,17 @@ def read_rows(lines: Iterable[NumberedLine], layout: RowLayout, where: str) -> R
         if not following:
             rows, findings = _drop_broken_last(rows, layout, where)
         if rows:
-            part = _parse_piece(rows, layout, where)
-            if count + len(part.values) > len(values):
-                values.resize((2 * len(values), layout.width), refcheck=False)  # what is not written takes no memory
-            values[count : count + len(part.values)] = part.values
-            count += len(part.values)
-            parts.append(replace(part, values=part.values[:0]))
+            parts.append(_parse_piece(rows, layout, where))
         piece = following
     if not parts:
         none = np.empty(0, dtype=np.intp)
         return Rows(np.empty((0, layout.width)), {}, none, np.zeros(layout.width, dtype=np.intp), findings)
-    values.resize((count, layout.width), refcheck=False)
+    values, first = np.empty((sum(len(part.numbers) for part in parts), layout.width)), 0
+    for place, part in enumerate(parts):  # each piece goes as soon as it is copied
+        values[first : first + len(part.numbers)] = part.values
+        first += len(part.numbers)
+        parts[place] = replace(part, values=part.values[:0].copy())
+        del part
     texts = {column: np.concatenate([part.texts[column] for part in parts]) for column in layout.texts}
     numbers = np.concatenate([part.numbers for part in parts])
     return Rows(values, texts, numbers, np.sum([part.words for part in parts], axis=0), findings)
