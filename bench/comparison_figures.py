@@ -202,7 +202,7 @@ def _draw_budget_panel(axes: Axes, frame: pd.DataFrame) -> None:
     columns = ["lower_quartile", "median", "upper_quartile"]
     zero = place_of_zero(table[columns].to_numpy())
     mark_zero(axes, zero, upright=True)
-    table[columns] = table[columns].replace(0.0, zero)
+    table[columns] = table[columns].where(table[columns] != 0, zero)
     for index, (label, group) in enumerate(table.groupby("algorithm", sort=False)):
         color, linestyle, marker = line_style(index)
         rows = group[np.isfinite(group["median"])]

@@ -173,7 +173,8 @@ def draw_convergence(table: pd.DataFrame) -> dict[str, bytes]:
             for index, (label, rows) in enumerate(table.groupby("algorithm", sort=False)):
                 color, linestyle, _ = line_style(index)
                 name = display_name(str(label))
-                drawn = rows[column].where(np.isfinite(rows[column])).replace(0.0, zero)
+                drawn = rows[column].where(np.isfinite(rows[column]))
+                drawn = drawn.where(drawn != 0, zero)
                 panel.plot(rows["iteration"], drawn, label=name, color=color, linestyle=linestyle)
             panel.set(title=title, yscale="log")
             panel.label_outer()
