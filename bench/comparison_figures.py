@@ -181,10 +181,12 @@ def draw_budgets(
         for axes, problem in zip(panels, problems, strict=True):
             _draw_budget_panel(axes, frame[frame["problem"] == problem])
             _draw_best_known(axes.axhline, known.get(str(problem)))
-            axes.set(title=problem, xlabel="budget of a run (evaluations)", xscale="log", yscale="log")
-            axes.yaxis.set_major_locator(LogLocator(subs=_TICK_MULTIPLES))  # powers of ten alone may be out of range
-            axes.yaxis.set_major_formatter("{x:g}")
-            axes.yaxis.set_minor_locator(NullLocator())
+            axes.set(title=problem, xlabel="budget of a run (evaluations)", xscale="log")
+            if any(np.isfinite(line.get_ydata()).any() for line in axes.lines):  # a scale needs a value
+                axes.set_yscale("log")
+                axes.yaxis.set_major_locator(LogLocator(subs=_TICK_MULTIPLES))  # powers of ten may be out of range
+                axes.yaxis.set_major_formatter("{x:g}")
+                axes.yaxis.set_minor_locator(NullLocator())
             budgets = sorted(frame["budget"].unique())
             axes.set_xticks(budgets, [f"{budget:,}" for budget in budgets])
             axes.xaxis.set_minor_locator(NullLocator())
