@@ -181,7 +181,8 @@ def draw_convergence(table: pd.DataFrame) -> dict[str, bytes]:
         panels[0].yaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))  # powers of ten alone may be out of range
         panels[0].yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         panels[0].yaxis.set_minor_formatter(NullFormatter())
-        figure.supxlabel("iteration (0: first population)", fontsize=9)
+        for panel in panels[2:]:
+            panel.set_xlabel("iteration (0: first population)")
         panels[0].set_ylabel("condition number (-)")
         panels[2].set_ylabel("condition number, feasible ends (-)")
         handles, labels = panels[0].get_legend_handles_labels()
