@@ -3,6 +3,7 @@
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -125,11 +126,14 @@ def test_every_algorithm_runs_with_its_fewest_points(name: str) -> None:
             minimise(algorithm, algorithm.Params(), len, box, np.zeros((n - 1, 2)), 8 * n, rng)
 
 
-def test_a_box_without_width_is_refused_before_any_trial(small: Path, armlab: Armlab) -> None:
-    small.write_text(small.read_text().replace("dimension: 3", "dimension: 3, half_width: 1.0e-330"))
-    done = armlab("run", small.name, "--dry-run")
-    assert done.returncode == 2
-    assert len(done.stderr.strip().splitlines()) == 1
+@pytest.mark.parametrize("upper", [[1.0, 0.0, 1.0], [1.0, -1.0, 1.0], [1.0, np.inf, 1.0]])
+def test_a_box_without_width_is_refused_before_any_trial(
+    small: Path, monkeypatch: pytest.MonkeyPatch, upper: list[float]
+) -> None:
+    box = SimpleNamespace(name="sphere", lower=np.zeros(3), upper=np.array(upper))
+    monkeypatch.setattr("bench.plan.build_problem", lambda settings: box)
+    with pytest.raises(InputError, match=r"problem 'sphere' of .*: box dimension 1: lower limit 0.0 must be finite"):
+        list(describe_run(small, RunOptions(small.with_name("s.sqlite"), small.parent / "r", 1)))
 
 
 def test_a_package_that_ends_its_process_does_not_end_the_command(small: Path, plug_in: PlugIn, armlab: Armlab) -> None:
