@@ -72,6 +72,8 @@ def _draw_ends_panel(axes: Axes, frame: pd.DataFrame, labels: list[str], known: 
         axes.set_xmargin(0.22)  # room for the notes on infeasible ends
     for row, label in enumerate(labels):
         _draw_row_of_ends(axes, row, label, losses[(frame["algorithm"] == label).to_numpy()])
+    if zero is not None:
+        axes.set_xlim(left=0.9 * zero)  # no tick stands below 0
 
 
 def _draw_best_known(draw_line: Callable[..., object], value: float | None) -> None:
