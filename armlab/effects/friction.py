@@ -149,29 +149,15 @@ def direction_of_motion(scene: Scene, *joints: int) -> Array:
 
     joints: from 0; of several, the sign of the sum of their velocities. The velocity is taken as a straight line
     within the interval. The sign at the sample itself is off by up to one at each reversal, and by as much as the
-    sampling is slow. Speeds below `standing_speed` count in proportion: friction holds a joint that stands, and the
-    sign of its noise says nothing.
+    sampling is slow. Speeds below the scene's `standing_speed` count in proportion: friction holds a joint that stands,
+    and the sign of its noise says nothing.
     """
     velocity = scene.motion.velocity[:, list(joints)].sum(axis=1)
     change = np.abs(scene.motion.acceleration[:, list(joints)].sum(axis=1)) * scene.step / 2
-    if scene.step > 0:
-        change = np.maximum(change, standing_speed(scene, joints))
+    if scene.standing_speed is not None:
+        change = np.maximum(change, max(scene.standing_speed[joint] for joint in joints))
     steady = change <= np.abs(velocity)
     return np.asarray(np.where(steady, np.sign(velocity), velocity / np.where(steady, 1.0, change)))
-
-
-STANDING_SHARE, STANDING_SHARE_OF_ALL = 0.003, 0.001
-
-
-def standing_speed(scene: Scene, joints: Sequence[int]) -> float:
-    """The speed below which joints, from 0, count as standing: a share of their own top speed in the run, and at least
-    a share of that of all joints of their kind.
-    """
-    top = np.abs(scene.motion.velocity).max(axis=0)
-    kinds = [joint.kind for joint in scene.arm.joints]
-    alike = [index for index, kind in enumerate(kinds) if kind == kinds[joints[0]]]
-    own = float(np.abs(scene.motion.velocity[:, list(joints)].sum(axis=1)).max())
-    return max(STANDING_SHARE * own, STANDING_SHARE_OF_ALL * float(top[alike].max()))
 
 
 def directions_apart(scene: Scene, joint: int) -> tuple[Array, Array]:

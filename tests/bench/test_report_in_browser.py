@@ -102,7 +102,7 @@ def test_values_can_be_read_with_the_mouse_and_with_the_keyboard(page: Any) -> N
 
 def test_every_picture_says_in_words_what_it_shows(page: Any) -> None:
     pictures = page.locator('svg[role="img"]').all()
-    assert len(pictures) == 6
+    assert len(pictures) == 8
     assert all(len(picture.get_attribute("aria-label")) > 15 for picture in pictures)
 
 

@@ -13,6 +13,7 @@ from armlab.common.arrays import Array
 from armlab.effects.coupling import neighbour_pairs
 from armlab.effects.friction import direction_of_motion
 from armlab.effects.memory import HeatedFriction, ThermometerFriction, ViscousDrift, dahl_state
+from armlab.effects.scene import standing_speeds
 from problem.motion import Motion
 
 
@@ -224,6 +225,6 @@ def test_a_joint_that_stands_has_no_direction() -> None:
     noise = 1e-4 * np.random.default_rng(0).standard_normal(len(time))
     velocity = np.column_stack([np.cos(2 * time), noise])
     motion = Motion(np.zeros_like(velocity), velocity, np.gradient(velocity, 0.004, axis=0))
-    where = scene_of(arm, motion, time)
+    where = replace(scene_of(arm, motion, time), standing_speed=standing_speeds(arm, motion))
     assert np.abs(direction_of_motion(where, 1)).max() < 0.5
     assert np.mean(np.abs(direction_of_motion(where, 0)) == 1) > 0.98
