@@ -57,9 +57,12 @@ class _Candidate:
     judged_block: NDArray[np.intp]
 
     def scores(self) -> Array:
-        """Of each block when the others are fitted, (blocks,)."""
+        """Of each block when the others are fitted, (blocks,); ValueError where fewer than two hold rows."""
+        numbers = np.intersect1d(self.block, self.judged_block)
+        if len(numbers) < 2:
+            raise DataError("the runs move too little to try cut-offs: record more motion")
         out = []
-        for number in range(BLOCKS):
+        for number in numbers:
             own, judged = self.block == number, self.judged_block == number
             values, _ = weighted_solution(self.matrix[~own], self.torque[~own])
             left = np.mean((self.judged_torque[judged] - self.judged_matrix[judged] @ values) ** 2, axis=0)

@@ -58,3 +58,10 @@ def test_a_run_that_stands_most_of_the_time_is_cut_into_blocks_that_all_move() -
 def test_without_a_run_there_is_no_cutoff() -> None:
     with pytest.raises(DataError, match="no run identifies"):
         try_cutoffs(ARM, [])
+
+
+def test_an_arm_that_stands_has_no_cutoff() -> None:
+    time = np.arange(0, 4, 1 / RATE_HZ)
+    run = Run("run.csv", "identify", time, np.zeros((len(time), 3)), torque=np.ones((len(time), 3)))
+    with pytest.raises(DataError, match="move too little"):
+        try_cutoffs(ARM, [run])
