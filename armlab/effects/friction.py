@@ -149,13 +149,10 @@ def direction_of_motion(scene: Scene, *joints: int) -> Array:
 
     joints: from 0; of several, the sign of the sum of their velocities. The velocity is taken as a straight line
     within the interval. The sign at the sample itself is off by up to one at each reversal, and by as much as the
-    sampling is slow. Speeds below the scene's `standing_speed` count in proportion: friction holds a joint that stands,
-    and the sign of its noise says nothing.
+    sampling is slow.
     """
     velocity = scene.motion.velocity[:, list(joints)].sum(axis=1)
     change = np.abs(scene.motion.acceleration[:, list(joints)].sum(axis=1)) * scene.step / 2
-    if scene.standing_speed is not None:
-        change = np.maximum(change, max(scene.standing_speed[joint] for joint in joints))
     steady = change <= np.abs(velocity)
     return np.asarray(np.where(steady, np.sign(velocity), velocity / np.where(steady, 1.0, change)))
 

@@ -13,7 +13,6 @@ from problem.pseudo_inertia import least_eigenvalues
 from problem.regressor import inertia_column, rigid_body_torque
 
 MOTION_STEP = 1e-4  # rad (m) of the largest change of position, for differences
-STANDING_SHARE = 0.001  # of the top speed of the other joints of its kind: a joint below it stands
 NO_INERTIA = 1e-9  # an eigenvalue of a pseudo-inertia, which rounding leaves of none
 
 
@@ -25,8 +24,7 @@ class Scene:
     time: (samples,), s, from the first sample of the run. inertial: (10 * joints,), the links of the present
     model. torque: (samples, joints), what the present model predicts, friction included, faults of the torque's
     channel left out, N m (N). temperature: (samples, sensors), degrees Celsius; link_position: (samples, joints),
-    rad (m); None where the run has none. standing_speed: (joints,), rad/s (m/s), below which a joint of a recording
-    stands; None for a motion that is exact.
+    rad (m); None where the run has none.
     """
 
     run: str
@@ -37,7 +35,6 @@ class Scene:
     torque: Array
     temperature: Array | None = None
     link_position: Array | None = None
-    standing_speed: Array | None = None
 
     def __post_init__(self) -> None:
         """Make the arrays read-only for laws: what one writes, all others would see."""
@@ -126,16 +123,7 @@ def _read_only(values: Array) -> Array:
 def scene_of(run: Run, motion: Motion, arm: Arm) -> Scene:
     """The scene of a run that is even in time and of its motion, before any model: links and torque are zeros."""
     zero, time = np.zeros(motion.position.shape), run.time - run.time[0]
-    links, still = np.zeros(10 * len(arm)), standing_speeds(arm, motion)
-    return Scene(run.name, time, motion, arm, links, zero, run.temperature, run.link_position, still)
-
-
-def standing_speeds(arm: Arm, motion: Motion) -> Array:
-    """Speeds below which joints count as standing, (joints,): a share of the top speed of the others of their kind."""
-    top = np.abs(motion.velocity).max(axis=0)
-    kinds = np.array([joint.kind for joint in arm.joints])
-    others = [(kinds == kind) & (np.arange(len(kinds)) != joint) for joint, kind in enumerate(kinds)]
-    return np.array([STANDING_SHARE * float(top[each].max(initial=0.0)) for each in others])
+    return Scene(run.name, time, motion, arm, np.zeros(10 * len(arm)), zero, run.temperature, run.link_position)
 
 
 def instants(arm: Arm, motion: Motion, inertial: Array | None = None) -> Scene:

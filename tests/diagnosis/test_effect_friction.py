@@ -13,8 +13,6 @@ from armlab.common.arrays import Array
 from armlab.effects.coupling import neighbour_pairs
 from armlab.effects.friction import direction_of_motion
 from armlab.effects.memory import HeatedFriction, ThermometerFriction, ViscousDrift, dahl_state
-from armlab.effects.scene import standing_speeds
-from problem.motion import Motion
 
 
 def integrated(time: Array, position: Array, way: float) -> Array:
@@ -218,13 +216,3 @@ def test_temperature_gives_a_candidate_only_where_every_run_has_it() -> None:
     ratio = torque_of(by_sensor, np.array([3.0, -1.0]), warm)[:, 0] / warm.motion.velocity[:, 0]
     assert ratio[0] == pytest.approx(3.0)
     assert ratio[-1] == pytest.approx(2.0)
-
-
-def test_a_joint_that_stands_has_no_direction() -> None:
-    arm, time = random_arm("RR"), np.arange(0, 4, 0.004)
-    noise = 1e-4 * np.random.default_rng(0).standard_normal(len(time))
-    velocity = np.column_stack([np.cos(2 * time), noise])
-    motion = Motion(np.zeros_like(velocity), velocity, np.gradient(velocity, 0.004, axis=0))
-    where = replace(scene_of(arm, motion, time), standing_speed=standing_speeds(arm, motion))
-    assert np.abs(direction_of_motion(where, 1)).max() < 0.5
-    assert np.mean(np.abs(direction_of_motion(where, 0)) == 1) > 0.98
