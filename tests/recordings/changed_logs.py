@@ -1,7 +1,11 @@
 """Logs that chance makes of clean runs: cut, joined, shuffled, doubled, thinned, on other clocks, in other formats.
 
 `python tests/recordings/changed_logs.py --logs 2000` tries as many and prints what became of them; `--first` continues
-where another call ended. Each comes to the numbers of the same runs read plainly, or is refused in one line.
+where another call ended. Each should come to the numbers of the same runs read plainly, or be refused in one line.
+
+Two things were decided after the first results. Numbers agree within three half widths of the 95 % intervals of both
+fits: no statistical test, but the size by which numbers from different motions of one arm differ (`odd_logs.py`). And
+one combination of changes is known to fail: see `is_known_to_fail`.
 """
 
 import argparse
@@ -12,32 +16,22 @@ import time
 import traceback
 from collections import Counter
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from odd_logs import MAX_DEVIATION
-from recording_folders import ARM, POSITION, RATE_HZ, TORQUE, frame
+from odd_logs import MAX_DEVIATION, fit, largest_deviation
+from recording_folders import IMPORT_OPTIONS, POSITION, RATE_HZ, TORQUE, frame
 
 from armlab.common.errors import InputError
-from armlab.identification.identifier import Identifier
-from armlab.identification.model import Model
 from armlab.recordings.imports.files import import_files
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Run
 
-SECONDS, CUTOFF_HZ = 8.0, 5.0
+SECONDS = 8.0
 EPISODES = 4
-TOLD_LOGS = 250
+COUNTED_LOGS = 250  # after as many the counts are printed
 MAX_LOST = 0.1  # of the rows that are measurements
-OPTIONS = {
-    **dict.fromkeys(("tip", "gains", "gear_ratio", "motor_side", "joints", "separator", "decimal", "topic"), None),
-    **dict.fromkeys(("time", "position", "torque", "reference_position", "command_topic"), None),
-    "robot": "irb120-arm",
-    "lock": (),
-    "validate": (),
-}
 FORMATS = ("csv", "semicolon", "csv.gz", "utf-16", "json", "jsonl", "parquet")
 CLOCKS = ("seconds", "milliseconds", "epoch", "iso", "sec and nanosec")
 CHANGES = (
@@ -49,14 +43,32 @@ CHANGES = (
 
 @dataclass(frozen=True, eq=False)
 class ChangedLog:
-    """table: with the time t in s. words: what was done. runs: the same measurements, run by run. rows: that count."""
+    """A table that was changed, and the clean runs that it comes from.
+
+    table: with the time t in s. origin: episodes, clock and rate. changes: names of CHANGES in their order. runs: the
+    same measurements, run by run. rows: of the table, that are whole measurements. form, clock: of FORMATS, of CLOCKS.
+    """
 
     table: pd.DataFrame
-    words: tuple[str, ...]
+    origin: str
+    changes: tuple[str, ...]
     runs: tuple[pd.DataFrame, ...]
     rows: int
     form: str
     clock: str
+
+    def __str__(self) -> str:
+        """What was done, in words."""
+        return ", ".join((self.origin, *self.changes, self.clock, self.form))
+
+    @property
+    def is_known_to_fail(self) -> bool:
+        """Whether positions and torques come in alternate rows, with stamps that are coarser than the rows.
+
+        Two rows then have one stamp, and no stamp tells that one was measured a step after the other: the signals are
+        up to a step apart, which changes the numbers. Of the seeds 0 to 3999, 11 are of this kind, and 2 of them fail.
+        """
+        return {"in turn", "coarse stamps"} <= set(self.changes)
 
 
 def draw_log(seed: int) -> ChangedLog:
@@ -77,15 +89,13 @@ def draw_log(seed: int) -> ChangedLog:
     table = pd.concat(
         [run.assign(t=run["t"] + start) for run, start in zip(runs, starts, strict=True)], ignore_index=True
     )
-    words = [f"{count} episode(s)", "clock from 0 each" if anew else "one clock", f"{RATE_HZ / step:g} Hz"]
+    origin = f"{count} episode(s), {'clock from 0 each' if anew else 'one clock'}, {RATE_HZ / step:g} Hz"
     rows = len(table)
     changes = [str(each) for each in rng.choice(CHANGES, size=int(rng.integers(0, 3)), replace=False)]
-    if set(changes) == {"in turn", "coarse stamps"}:
-        changes.remove("coarse stamps")  # equal stamps of two messages say that they belong together: nobody can know
     for change in changes:
         table, rows = change_table(table, rows, change, rng)
-        words.append(change)
-    return ChangedLog(table, tuple(words), tuple(runs), rows, str(rng.choice(FORMATS)), str(rng.choice(CLOCKS)))
+    form, clock = str(rng.choice(FORMATS)), str(rng.choice(CLOCKS))
+    return ChangedLog(table, origin, tuple(changes), tuple(runs), rows, form, clock)
 
 
 def change_table(table: pd.DataFrame, rows: int, change: str, rng: np.random.Generator) -> tuple[pd.DataFrame, int]:
@@ -177,48 +187,36 @@ class Judged:
     outcome: str
     line: str
 
+    @property
+    def is_broken(self) -> bool:
+        """Whether the log is neither read rightly nor refused in one line."""
+        return self.outcome.startswith("broken")
+
 
 def judge_log(log: ChangedLog, folder: Path) -> Judged:
-    """What becomes of a log."""
+    """What becomes of a log. Raises what the import or the fit raises, but for a refusal."""
     units = ("time=s",) if log.clock in ("seconds", "epoch") else ()
     try:
-        import_files([write_log(log, folder)], folder / "recording", {**OPTIONS, "units": units})
+        import_files([write_log(log, folder)], folder / "recording", {**IMPORT_OPTIONS, "units": units})
         runs = load_recording(folder / "recording").runs
-        model = Identifier(ARM, cutoff_hz=CUTOFF_HZ).fit(runs).model_
+        model = fit(runs)
     except InputError as error:
         return Judged("refused" if "\n" not in str(error) else "broken: lines", str(error))
-    except Exception:
-        return Judged("broken: traceback", traceback.format_exc().splitlines()[-1])
     kept = sum(run.samples for run in runs)
     if kept < (1 - MAX_LOST) * log.rows - 2 * len(log.runs):
         return Judged("broken: rows lost", f"{kept} of {log.rows}")
-    found = {(part, each.name): each for part, each in model.named_parameters()}
-    widths = [np.ptp(np.array(each.interval)) for each in found.values() if each.interval is not None]
-    if min(widths) <= 0:
-        return Judged("broken: no width", "")
-    worst = 0.0
-    for name, plain in _plain_fit(log).items():
-        half = np.hypot(np.ptp(np.array(found[name].interval)), np.ptp(np.array(plain.interval))) / 2
-        worst = max(worst, float(abs(np.asarray(found[name].value) - np.asarray(plain.value)) / half))
+    worst = largest_deviation(model, fit(tuple(_plain_run(table) for table in log.runs)))
     return Judged("agrees" if worst < MAX_DEVIATION else "broken: other numbers", f"{worst:.2f} half widths")
-
-
-def _plain_fit(log: ChangedLog) -> dict[tuple[str, str], object]:
-    runs = tuple(_plain_run(table) for table in log.runs)
-    model: Model = Identifier(ARM, cutoff_hz=CUTOFF_HZ).fit(runs).model_
-    return {(part, each.name): each for part, each in model.named_parameters()}
 
 
 def _plain_run(table: pd.DataFrame) -> Run:
     return Run("run.csv", "identify", table["t"].to_numpy(), table[POSITION].to_numpy(), table[TORQUE].to_numpy())
 
 
-@lru_cache
-def judge_seed(seed: int) -> tuple[ChangedLog, Judged]:
-    """The log of a seed, and what becomes of it."""
-    log = draw_log(seed)
+def judge_seed(seed: int) -> Judged:
+    """What becomes of the log of a seed."""
     with tempfile.TemporaryDirectory() as folder:
-        return log, judge_log(log, Path(folder))
+        return judge_log(draw_log(seed), Path(folder))
 
 
 def main(arguments: list[str]) -> int:
@@ -230,15 +228,18 @@ def main(arguments: list[str]) -> int:
     options = parser.parse_args(arguments)
     counts, started = Counter[str](), time.monotonic()
     for seed in range(options.first, options.first + options.logs):
-        if counts.total() % TOLD_LOGS == TOLD_LOGS - 1:
+        if counts.total() % COUNTED_LOGS == COUNTED_LOGS - 1:
             print(f"{counts.total() + 1} logs: {dict(counts)}", flush=True)
-        log, judged = judge_seed(seed)
-        judge_seed.cache_clear()
-        counts[judged.outcome] += 1
-        if judged.outcome.startswith("broken") or (options.refusals and judged.outcome == "refused"):
-            print(
-                f"{seed}: {judged.outcome}: {', '.join(log.words)}, {log.clock}, {log.form}: {judged.line}", flush=True
-            )
+        log = draw_log(seed)
+        try:
+            judged = judge_seed(seed)
+        except Exception as error:  # a trial goes on, and says where it broke
+            traceback.print_exc()
+            judged = Judged("broken: traceback", repr(error))
+        outcome = f"{judged.outcome} (known)" if judged.is_broken and log.is_known_to_fail else judged.outcome
+        counts[outcome] += 1
+        if judged.is_broken or (options.refusals and judged.outcome == "refused"):
+            print(f"{seed}: {outcome}: {log}: {judged.line}", flush=True)
     listed = ", ".join(f"{number} {outcome}" for outcome, number in sorted(counts.items()))
     print(f"{counts.total()} logs in {time.monotonic() - started:.0f} s: {listed}")
     return 1 if any(outcome.startswith("broken") for outcome in counts) else 0

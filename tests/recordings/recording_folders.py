@@ -21,6 +21,14 @@ SETTINGS: dict[str, Any] = {
     "units": {"time": "s", "position": "rad", "torque": "N.m"},
     "runs": [{"file": "run.csv", "role": "identify"}, {"file": "check.csv", "role": "validate"}],
 }
+IMPORT_OPTIONS: dict[str, Any] = {  # of an import to which nothing is told but the robot
+    **dict.fromkeys(("tip", "gains", "gear_ratio", "motor_side", "joints", "separator", "decimal", "topic", "time")),
+    **dict.fromkeys(("position", "torque", "reference_position", "command_topic", "repair")),
+    "robot": "irb120-arm",
+    "lock": (),
+    "validate": (),
+    "units": (),
+}
 
 
 def motion_at(time: np.ndarray, seed: int = 0) -> Motion:

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from odd_logs import bag, lists
-from recording_folders import POSITION, TORQUE, frame
+from recording_folders import IMPORT_OPTIONS, POSITION, TORQUE, frame
 from scipy.io import savemat
 
 import armlab.recordings.imports
@@ -21,14 +21,7 @@ from armlab.recordings.imports.files import import_files
 pytest.importorskip("rosbags")
 pytest.importorskip("pyarrow")
 FOLDER = Path(armlab.recordings.imports.__file__).parent
-OPTIONS: dict[str, Any] = {
-    **dict.fromkeys(("tip", "gains", "gear_ratio", "motor_side", "joints", "separator", "decimal", "topic", "time")),
-    **dict.fromkeys(("position", "torque", "reference_position", "command_topic", "repair")),
-    "robot": "irb120-arm",
-    "lock": (),
-    "validate": (),
-    "units": ("position=rad", "torque=N.m"),
-}
+OPTIONS = {**IMPORT_OPTIONS, "units": ("position=rad", "torque=N.m")}
 OF_COMMANDS = ("hold the commands",)  # of bags, in test_controller_bags.py
 ELSEWHERE = {  # tested where the files are made, or where a package is missing
     "lerobot.py": "test_motion_recordings.py",
