@@ -10,7 +10,7 @@ from scipy.stats import t as student
 from armlab.common.errors import InputError
 from armlab.diagnosis.real_folders.reading_bound import ArmVerdict, WrongReading, bound_of, write_bound
 from armlab.identification.likeness.real_arms import RealFolder
-from armlab.recordings.reading.bound import learnt_bound
+from armlab.recordings.reading.tuning import learnt_bound
 
 
 def wrong_reading(arm: str, evidence: float, licensed: bool = True) -> WrongReading:

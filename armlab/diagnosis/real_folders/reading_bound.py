@@ -25,11 +25,10 @@ from armlab.identification.likeness.real_arms import RealFolder
 from armlab.recordings.load import load_recording
 from armlab.recordings.motion import is_motion_only
 from armlab.recordings.reading.answer import read_rightly
-from armlab.recordings.reading.bound import BOUND_FILE, BOUND_SCHEMA
 from armlab.recordings.reading.judge import Judge, Trial
 from armlab.recordings.reading.reading import SPRING, read_as_is
 from armlab.recordings.reading.singles import search_singles
-from armlab.recordings.reading.tuning import ReadingTuning
+from armlab.recordings.reading.tuning import BOUND_FILE, BOUND_SCHEMA, ReadingTuning
 from armlab.recordings.recording import Recording
 
 CHANCE = 0.01  # of a wrong reading on one more arm

@@ -2,7 +2,7 @@
 
 Many readings are looked at; the errors of the best ones are compared joint by joint and block by block. A mistake is
 the last explanation of a large error: taken back, it has to explain more than the best wrong reading of a real arm
-explains by chance (`bound.py`).
+explains by chance (`bound.json`).
 """
 
 from collections.abc import Callable, Sequence
