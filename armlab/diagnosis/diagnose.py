@@ -53,7 +53,7 @@ from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.simulation import read_simulation, reason_misread
 from armlab.diagnosis.solver import State
 from armlab.diagnosis.surrogate import Structure
-from armlab.diagnosis.told.selection import stated_findings, with_minor_ones, without_lesser_unknowns
+from armlab.diagnosis.told.findings import stated_findings, with_minor_ones, without_lesser_unknowns
 from armlab.diagnosis.told.summary import describe_unnamed, summary_of, unnamed_gain
 from armlab.diagnosis.tuning import changed_numbers
 from armlab.diagnosis.unknown import (

@@ -32,7 +32,7 @@ from armlab.diagnosis.formats import (
 )
 from armlab.diagnosis.found_model import model_found
 from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Located, Unexplained
-from armlab.diagnosis.told.causes import ToldCause, finding_shares
+from armlab.diagnosis.told.findings import ToldCause, finding_shares
 from armlab.diagnosis.told.told import finding_errors, tell
 from armlab.effects.library import effect_named
 from armlab.effects.parameters import ParameterValue

@@ -12,7 +12,7 @@ from armlab.diagnosis.naming.choice import Example, Weights, fit_lapse, fit_weig
 from armlab.diagnosis.naming.decide import calibrated_weights, named_claims, naming_of, unknown_limit
 from armlab.diagnosis.result import Claim, Rival, Weighed, WeighedName
 from armlab.diagnosis.settings import Settings, vary
-from armlab.diagnosis.told.statement import Statement, statement_of
+from armlab.diagnosis.told.findings import Statement, statement_of
 from armlab.effects.drive import TorqueOffset
 from armlab.effects.friction import CoulombFriction
 

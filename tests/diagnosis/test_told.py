@@ -8,9 +8,16 @@ import pytest
 
 from armlab.diagnosis.parts import add_in_order, cause_of, stack_in_units
 from armlab.diagnosis.result import Claim, Member, Part, Removal
-from armlab.diagnosis.told.causes import causes_of, finding_shares, leading_causes
-from armlab.diagnosis.told.selection import stated_findings, with_minor_ones, without_lesser_unknowns
-from armlab.diagnosis.told.statement import Statement, statement_of
+from armlab.diagnosis.told.findings import (
+    Statement,
+    causes_of,
+    finding_shares,
+    leading_causes,
+    stated_findings,
+    statement_of,
+    with_minor_ones,
+    without_lesser_unknowns,
+)
 from armlab.effects.contract import UNKNOWN, Effect
 from armlab.effects.library import effect_named
 

@@ -63,7 +63,7 @@ from armlab.diagnosis.report.words import (
     rival_in_words,
 )
 from armlab.diagnosis.settings import Baseline
-from armlab.diagnosis.told.statement import FRICTION
+from armlab.diagnosis.told.findings import FRICTION
 from armlab.diagnosis.told.summary import MAX_WORDS
 from armlab.diagnosis.tuning import ComparisonTuning
 from armlab.diagnosis.verdict_files import check_output_folder

@@ -9,9 +9,7 @@ from armlab.diagnosis.motion.naming import servo_naming
 from armlab.diagnosis.naming.decide import Naming
 from armlab.diagnosis.parts import cause_of
 from armlab.diagnosis.result import MAX_MINOR_GROWTH
-from armlab.diagnosis.told.causes import MAX_TOLD_CAUSES, ToldCause
-from armlab.diagnosis.told.selection import MAX_TOLD_OF_JOINT
-from armlab.diagnosis.told.statement import Statement, state_name
+from armlab.diagnosis.told.findings import MAX_TOLD_CAUSES, MAX_TOLD_OF_JOINT, Statement, ToldCause, state_name
 from armlab.diagnosis.tuning import NamingTuning
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named

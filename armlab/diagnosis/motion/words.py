@@ -11,7 +11,7 @@ from armlab.diagnosis.motion.told import ToldNumber, causes_told, told_numbers
 from armlab.diagnosis.motion.witness import CurrentWitness
 from armlab.diagnosis.report.verdict import LINE_WIDTH
 from armlab.diagnosis.report.words import LESS_MASS, SOMETHING_UNKNOWN, format_chance
-from armlab.diagnosis.told.statement import FRICTION
+from armlab.diagnosis.told.findings import FRICTION
 from armlab.diagnosis.told.summary import MAX_FIRST_WORDS, MAX_WORDS
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named

@@ -26,7 +26,7 @@ from armlab.diagnosis.report.words import (
 )
 from armlab.diagnosis.result import Claim, Diagnosis, JointFit
 from armlab.diagnosis.simulation import Simulation
-from armlab.diagnosis.told.statement import FRICTION
+from armlab.diagnosis.told.findings import FRICTION
 from armlab.diagnosis.told.steps import next_steps
 from armlab.diagnosis.told.summary import sentences_of, shorter_list
 from armlab.diagnosis.told.told import Told, ToldFinding, finding_errors, tell

@@ -11,7 +11,7 @@ from armlab.common.report.wording import format_number, format_unit, join_words
 from armlab.diagnosis.result import Claim, Member, Rival
 from armlab.diagnosis.settings import Baseline
 from armlab.diagnosis.simulation import Simulation
-from armlab.diagnosis.told.statement import Statement
+from armlab.diagnosis.told.findings import Statement
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 from armlab.effects.links import PAYLOAD_FACTS

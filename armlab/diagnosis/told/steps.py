@@ -7,7 +7,7 @@ import numpy as np
 from armlab.common.report.wording import join_words
 from armlab.diagnosis.report.words import is_of_unknown_links, variables_in_words
 from armlab.diagnosis.result import Diagnosis
-from armlab.diagnosis.told.statement import FRICTION
+from armlab.diagnosis.told.findings import FRICTION
 from armlab.diagnosis.told.told import Told, ToldFinding
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.drive import TORQUE_OFFSET_FACTS

@@ -19,8 +19,7 @@ from armlab.diagnosis.report.words import (
     joint_unit,
 )
 from armlab.diagnosis.result import Diagnosis, JointFit
-from armlab.diagnosis.told.causes import TOLD_SHARE, ToldCause
-from armlab.diagnosis.told.statement import FRICTION
+from armlab.diagnosis.told.findings import FRICTION, TOLD_SHARE, ToldCause
 from armlab.diagnosis.told.told import Told, ToldFinding, tell
 from armlab.diagnosis.tuning import ClaimTuning
 from armlab.effects.library import effect_named
