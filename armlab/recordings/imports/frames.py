@@ -13,7 +13,7 @@ import pandas as pd
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.recordings.imports.matlab import table_of_arrays
-from armlab.recordings.imports.text_stamps import NO_STAMP, find_stamp_format, seconds_of
+from armlab.recordings.imports.time_columns import NO_STAMP, find_stamp_format, seconds_of
 from armlab.recordings.table import HEADER_LINES, Table
 from armlab.recordings.text_rows import open_lines
 

@@ -21,7 +21,7 @@ from armlab.recordings.imports.rates import put_on_common_stamps
 from armlab.recordings.imports.robots import ImportedRobot, read_robot
 from armlab.recordings.imports.scales import choose_gains, choose_units
 from armlab.recordings.imports.sources import ReadOptions, Source, read_sources
-from armlab.recordings.imports.two_columns import JOINED, join_all
+from armlab.recordings.imports.time_columns import JOINED, join_columns
 from armlab.recordings.recording_file import check_new_folder
 from armlab.recordings.units import SENSOR_SIGNALS, TIME_UNITS
 from problem.robot_file import built_in_arms
@@ -79,7 +79,7 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
     chosen_columns, unnamed = choose_columns(log, commands, unmatched)
     columns = {signal: known.value for signal, known in chosen_columns.items()}
     if len(columns.get("time", ())) == 2:
-        sources = join_all(sources, columns["time"])
+        sources = {path: _join_time(source, columns["time"]) for path, source in sources.items()}
         log, columns = replace(log, source=next(iter(sources.values()))), {**columns, "time": (JOINED,)}
     _check_sources(sources, columns)
     _check_order(columns)
@@ -113,6 +113,12 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
         joints=log.joints if arm and (log.joints != whole or chosen) else (),
         questions=(*robots, *unmatched, *unnamed, *unmeasured, *unscaled, *impossible, *_ask_out(files, options)),
     )
+
+
+def _join_time(source: Source, names: tuple[str, ...]) -> Source:
+    """The source with its time in one column."""
+    table = join_columns(source.table, names, source.units.get(names[1]))
+    return replace(source, table=table, units={**source.units, JOINED: "s"})
 
 
 def _read_robot(options: Options) -> tuple[ImportedRobot | None, Question | None]:

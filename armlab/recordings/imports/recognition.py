@@ -12,7 +12,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.recordings.imports.two_columns import find_two_columns
+from armlab.recordings.imports.time_columns import find_two_columns
 from armlab.recordings.units import TIME_UNITS
 
 TIME_NAMES = ("__time", "time", "timestamp", "timestamps", "stamp", "t", "robot_time", "header_stamp")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.errors import InputError
-from armlab.recordings.imports.text_stamps import StampFormat, find_stamp_format, seconds_of
+from armlab.recordings.imports.time_columns import StampFormat, find_stamp_format, seconds_of
 from armlab.recordings.repair import MAX_LOST_SHARE
 from armlab.recordings.table import Table, check_column_count
 from armlab.recordings.text_rows import (

@@ -1,17 +1,22 @@
-"""Stamps as text: ISO 8601 with or without a zone, dates of other orders, times of the day, or parts of both.
+"""Time as files write it: stamps as text, or in two columns.
 
-Each becomes nanoseconds; what is no stamp becomes NO_STAMP. A time of the day counts from midnight.
+Stamps as text are ISO 8601 with or without a zone, dates of other orders, times of the day, or parts of both. Each
+becomes nanoseconds; what is no stamp becomes NO_STAMP. A time of the day counts from midnight. Two columns hold seconds
+and a fraction of them, or date and time of the day; they become one column of seconds.
 """
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
+from armlab.common.errors import InputError
+from armlab.recordings.table import Table
+from armlab.recordings.units import TIME_UNITS
 
 NO_STAMP = np.iinfo(np.int64).min  # of NumPy's missing time
 MIN_STAMP_SHARE = 0.9  # of the cells of a column of stamps
@@ -24,6 +29,10 @@ DATE_FORMATS = {
 }
 TIME_OF_DAY = r"\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?(?:\s*[AaPp][Mm])?"
 ISO = re.compile(r"\d{4}-\d{2}-\d{2}([T ].*)?")
+JOINED = "time_from_two_columns"
+SECONDS = re.compile(r"(.*?)(secs?|seconds?)")
+FRACTION = re.compile(r"(.*?)(nsecs?|nanosecs?|nanoseconds?|usecs?|microsecs?|microseconds?|msecs?|milliseconds?)")
+PARTS = {"n": "ns", "u": "us", "mi": "us", "ms": "ms", "mil": "ms"}  # beginnings of words of parts of a second
 Stamps = NDArray[np.int64]
 
 
@@ -101,3 +110,44 @@ def seconds_of(stamps: Stamps) -> Array:
 def is_within_a_day(stamps: Stamps) -> bool:
     """Whether stamps count from midnight."""
     return bool(stamps.min() >= 0 and stamps.max() < DAY_NS)
+
+
+def find_two_columns(names: Sequence[str]) -> tuple[str, str] | None:
+    """Columns of seconds and of a fraction of them, such as `header.stamp.sec` and `header.stamp.nanosec`."""
+    whole = {match[1]: name for name in names if (match := SECONDS.fullmatch(name.lower()))}
+    for name in names:
+        match = FRACTION.fullmatch(name.lower())
+        if match is not None and match[1] in whole:
+            return whole[match[1]], name
+    return None
+
+
+def join_columns(table: Table, names: tuple[str, ...], unit: str | None) -> Table:
+    """The table with one more column, JOINED, in seconds from the first row: the sum of two columns of time.
+
+    unit: of the second column, where the file names it. Raises InputError where the second is no part of the first.
+    """
+    whole, part = (table.columns((name,), "time")[:, 0] for name in names)
+    if not np.isfinite(whole).any() or not np.isfinite(part).any():
+        raise InputError(f"--time {','.join(names)}: {table.file} has a column of these without any number or stamp")
+    known = np.flatnonzero(np.isfinite(whole))
+    seconds = whole - whole[known[0]] + _part_in_seconds(part, names[1], unit)
+    return replace(table, names=(*table.names, JOINED), values=np.column_stack([table.values, seconds]))
+
+
+def _part_in_seconds(part: Array, name: str, unit: str | None) -> Array:
+    if unit == "s":  # a time of the day as text, from the first one
+        return part
+    match = FRACTION.fullmatch(name.lower())
+    word = match[2] if match else ""
+    unit = unit or next(
+        (PARTS[start] for start in sorted(PARTS, key=len, reverse=True) if word.startswith(start)), None
+    )
+    largest = float(np.nanmax(part))
+    unit = unit or next((each for each in ("ms", "us", "ns") if largest * TIME_UNITS[each].factor < 1), None)
+    if unit is None or largest * TIME_UNITS[unit].factor > 1:
+        raise InputError(
+            f"--time: column {name} reaches {largest:.6g}, which is no part of a second in {unit or 'ns, us or ms'}: "
+            "give the column of seconds, then that of their fraction"
+        )
+    return part * TIME_UNITS[unit].factor
