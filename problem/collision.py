@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.errors import InputError, in_one_line
 from problem.arm import Arm, Limits
 from problem.mjcf import import_mujoco
 
@@ -148,7 +148,7 @@ def _spec_of_file(arm: Arm, robot: str, radius: float | None) -> tuple[Any, str]
         spec.compiler.balanceinertia = True
         model = spec.compile()
     except ValueError as error:
-        reason = " ".join(str(error).split()).removeprefix("Error: ")
+        reason = in_one_line(error).removeprefix("Error: ")
         return _capsules(arm, radius, f"MuJoCo cannot read the geometry of {path.name}: {reason}")
     moving = model.body_weldid[model.geom_bodyid[_collides(model)]] > 0
     if not moving.any():

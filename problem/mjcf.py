@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.errors import InputError, in_one_line
 from problem.arm import Arm, Joint, JointLaw, Limits, Link
 from problem.kinematic_tree import Follower, KinematicTree, TreeJoint
 from problem.mjcf_document import UneditableError
@@ -80,7 +80,7 @@ def _compiled(read: Callable[[str], Any], given: str, path: Path) -> Any:
     try:
         return read(given)
     except ValueError as error:
-        reason = " ".join(str(error).split())
+        reason = in_one_line(error)
         hint = "; remove visual meshes that are not at hand" if "mesh" in reason.lower() else ""
         raise InputError(f"{path}: MuJoCo cannot compile it: {reason}{hint}") from None
 
@@ -97,7 +97,7 @@ def written_mjcf(spec: Any, source: Path) -> str:
         spec.compile()
         return str(spec.to_xml())
     except (ValueError, import_mujoco().FatalError) as error:
-        raise InputError(f"MuJoCo cannot write {source.name}: {' '.join(str(error).split())}") from None
+        raise InputError(f"MuJoCo cannot write {source.name}: {in_one_line(error)}") from None
 
 
 def read_mjcf(path: Path) -> Arm:

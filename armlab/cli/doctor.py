@@ -17,7 +17,7 @@ from time import perf_counter
 from typing import Literal
 
 from armlab.common.documents import FailedResultError, ResultLines
-from armlab.common.errors import InputError
+from armlab.common.errors import InputError, in_one_line
 
 State = Literal["ok", "missing", "broken"]
 KERNELS = {
@@ -147,7 +147,7 @@ def _examine_self_test(title: str, test: Callable[[], str]) -> Examined:
     try:
         text = test()
     except (ImportError, OSError, ArithmeticError, ValueError, InputError) as error:
-        return Examined(title, "broken", f"{type(error).__name__}: {' '.join(str(error).split())}")
+        return Examined(title, "broken", f"{type(error).__name__}: {in_one_line(error)}")
     return Examined(title, "ok", f"{text}; {perf_counter() - started:.1f} s")
 
 

@@ -16,7 +16,7 @@ import click
 
 from armlab.cli.output import json_option, quiet_option
 from armlab.common.documents import FailedResultError
-from armlab.common.errors import DataError, InputError, PlugInWarning
+from armlab.common.errors import DataError, InputError, PlugInWarning, in_one_line
 from bench.errors import StoppedError, TrialsFailedError
 
 _THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -148,7 +148,7 @@ class _CommandGroup(click.Group):
                 warnings.showwarning = partial(_show_warning, warnings.showwarning)
                 return super().invoke(ctx)
         except (InputError, DataError) as error:
-            text = " ".join(str(error).split())  # a name out of a file may have lines of its own
+            text = in_one_line(error)  # a name out of a file may have lines of its own
             click.echo(f"armlab: {text}", err=True)
             ctx.exit(2)
         except StoppedError as error:

@@ -22,8 +22,13 @@ class PlugInWarning(UserWarning):
     """A plug-in is left out."""
 
 
+def in_one_line(error: BaseException) -> str:
+    """The text of an error without the line ends that third parties put into it."""
+    return " ".join(str(error).split())
+
+
 def describe_failure(error: BaseException) -> str:
     """What went wrong in code of a third party, in one line."""
     kind = "it ends the program (sys.exit)" if isinstance(error, SystemExit) else type(error).__name__
-    text = " ".join(str(error).split())
+    text = in_one_line(error)
     return f"{kind}: {text}" if text else kind

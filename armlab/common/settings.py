@@ -16,7 +16,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError, model_validator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from armlab.common.errors import InputError
+from armlab.common.errors import InputError, in_one_line
 
 T = TypeVar("T")
 _UNKNOWN_KEY = "unknown_key"
@@ -157,7 +157,7 @@ def read_yaml(path: str | Path) -> Any:
         hint = "; indent with spaces" if "'\\t'" in str(error.problem) else ""
         raise InputError(f"{path}, line {line}: not valid YAML: {error.problem}{hint}") from None
     except (yaml.YAMLError, ValueError) as error:
-        raise InputError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from None
+        raise InputError(f"{path}: not valid YAML: {in_one_line(error)}") from None
     except RecursionError:
         raise InputError(f"{path}: nested too deeply to be a settings file") from None
 

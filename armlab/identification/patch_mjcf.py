@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from armlab.common.errors import InputError
+from armlab.common.errors import InputError, in_one_line
 from armlab.common.report.wording import join_words
 from armlab.common.xml_text import XmlText, parse_xml_text
 from armlab.identification.export import SimulatorModel, format_numbers, link_inertias
@@ -145,7 +145,7 @@ def _spec_of_urdf(source: Path) -> tuple[Any, list[str]]:
         spec = import_mujoco().MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
         spec.compile()
     except (InputError, ValueError) as error:
-        raise UnreadableError(f"MuJoCo cannot read {source.name}: {' '.join(str(error).split())}") from None
+        raise UnreadableError(f"MuJoCo cannot read {source.name}: {in_one_line(error)}") from None
     names = ", ".join(sorted(set(left_out)))
     return spec, [f"left out, since they are not at hand as STL or OBJ: {names}"] if names else []
 

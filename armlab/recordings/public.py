@@ -12,7 +12,7 @@ import pandas as pd
 from scipy.io import loadmat
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.errors import InputError, in_one_line
 from armlab.common.settings import suggest_name
 from armlab.recordings.imports.ros import read_bag
 from armlab.recordings.load import load_recording
@@ -394,5 +394,5 @@ def _download(recording: PublicRecording, address: str, file: RemoteFile) -> Pat
         folder = cache / recording.folder
         return Path(pooch.retrieve(address, f"sha256:{file.sha256}", file.name, folder))
     except (OSError, ValueError) as error:  # no connection; another content than registered
-        reason = " ".join(str(error).split())[:200]
+        reason = in_one_line(error)[:200]
         raise InputError(f"cannot fetch {address}: {reason}; or set {LOCAL_COPIES_VARIABLE} to a local copy") from None

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.errors import InputError, in_one_line
 from armlab.common.settings import suggest_name
 from armlab.recordings.recording import Finding
 from armlab.recordings.text_rows import RowLayout, open_lines, read_rows, split_line
@@ -109,5 +109,5 @@ def _read_parquet(path: Path) -> Table:
                 column = file.read(columns=[name])
                 values[:, place] = column.columns[0].cast(arrow.float64()).to_numpy(zero_copy_only=False)
     except (arrow.ArrowException, OSError, IndexError) as error:
-        raise InputError(f"cannot read {path} as Parquet: {' '.join(str(error).split())[:200]}") from None
+        raise InputError(f"cannot read {path} as Parquet: {in_one_line(error)[:200]}") from None
     return Table(path.name, names, values, HEADER_LINES + 1 + np.arange(rows))

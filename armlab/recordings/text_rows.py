@@ -19,7 +19,7 @@ from armlab.recordings.recording import Finding
 MAX_TEXT_BYTES = 10 * 10**9  # a text of this size is read for minutes
 NO_NUMBER = ("", "nan", "null", "none", "na", "n/a")  # cells that stand for a number that is missing, in lower case
 PIECE_BYTES, PIECE_LINES = 1 << 20, 20_000
-TOLD_LINES = 100_000
+PROGRESS_LINES = 100_000  # from one line of progress to the next
 Progress = Callable[[str], None]
 NumberedLine = tuple[int, str]  # number in the file, from 1, and text with its line end
 
@@ -31,7 +31,7 @@ def silent(message: str) -> None:
 def tell_lines(lines: Iterable[NumberedLine], name: str, progress: Progress) -> Iterator[NumberedLine]:
     """The lines; progress is told how many were read."""
     for number, line in lines:
-        if number % TOLD_LINES == 0:
+        if number % PROGRESS_LINES == 0:
             progress(f"{name}: {number:,} rows read")
         yield number, line
 

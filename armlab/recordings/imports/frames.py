@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.errors import InputError, in_one_line
 from armlab.recordings.imports.matlab import table_of_arrays
 from armlab.recordings.imports.time_columns import NO_STAMP, find_stamp_format, seconds_of
 from armlab.recordings.table import HEADER_LINES, Table
@@ -41,7 +41,7 @@ def read_parquet(path: Path) -> FrameTable:
     try:
         frame = parquet.read_table(path).to_pandas()
     except (ArrowException, OSError, ValueError) as error:
-        raise InputError(f"cannot read {path} as Parquet: {' '.join(str(error).split())[:200]}") from None
+        raise InputError(f"cannot read {path} as Parquet: {in_one_line(error)[:200]}") from None
     return table_of_frame(frame, path)
 
 
@@ -52,7 +52,7 @@ def read_json(path: Path) -> FrameTable:
     try:
         return table_of_frame(_frame_of(json.loads(text), path), path)
     except (ValueError, TypeError, RecursionError) as error:
-        raise InputError(f"cannot read {path} as JSON: {' '.join(str(error).split())[:200]}") from None
+        raise InputError(f"cannot read {path} as JSON: {in_one_line(error)[:200]}") from None
 
 
 def read_json_lines(path: Path) -> FrameTable:
@@ -65,7 +65,7 @@ def read_json_lines(path: Path) -> FrameTable:
             try:
                 rows.append(json.loads(line))
             except (ValueError, RecursionError) as error:
-                broken.append((number, " ".join(str(error).split())))
+                broken.append((number, in_one_line(error)))
                 rows.append(None)
     if broken and (len(broken) > 1 or rows[-1] is not None):
         raise InputError(f"{path}, line {broken[0][0]} is no JSON: {broken[0][1][:200]}")
@@ -156,6 +156,6 @@ def read_npz(path: Path) -> Table:
         with np.load(path, allow_pickle=False) as content:
             arrays = [(str(name), np.asarray(content[name])) for name in content.files]
     except (OSError, ValueError, KeyError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile) as error:
-        raise InputError(f"cannot read {path} as .npz: {' '.join(str(error).split())[:200]}") from None
+        raise InputError(f"cannot read {path} as .npz: {in_one_line(error)[:200]}") from None
     numbers = [(name, array.astype(np.float64)) for name, array in arrays if array.dtype.kind in "fiub"]
     return table_of_arrays([each for each in numbers if each[1].ndim in (1, 2)], path)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.errors import InputError, in_one_line
 from armlab.recordings.table import HEADER_LINES, Table
 
 INFO = Path("meta/info.json")
@@ -57,7 +57,7 @@ def _features(folder: Path) -> dict[str, Any]:
     try:
         content = json.loads((folder / INFO).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise InputError(f"cannot read {folder / INFO}: {' '.join(str(error).split())}") from None
+        raise InputError(f"cannot read {folder / INFO}: {in_one_line(error)}") from None
     features = content.get("features") if isinstance(content, dict) else None
     if not isinstance(features, dict):
         raise InputError(f"{folder / INFO} has no 'features': it is no LeRobot dataset of version 2 or 3")
@@ -90,7 +90,7 @@ def _read_columns(path: Path) -> dict[str, Array]:
         table = parquet.read_table(path, columns=[COMMAND, STATE, STAMP, EPISODE])
         return {name: np.array(table[name].to_pylist(), dtype=np.float64) for name in table.column_names}
     except (ArrowException, OSError, KeyError, ValueError, TypeError) as error:
-        raise InputError(f"cannot read {path}: {' '.join(str(error).split())[:200]}") from None
+        raise InputError(f"cannot read {path}: {in_one_line(error)[:200]}") from None
 
 
 def _check_width(values: Array, names: tuple[str, ...], vector: str, path: Path) -> Array:

@@ -19,7 +19,7 @@ from scipy.io import loadmat
 from scipy.io.matlab import MatReadError
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.errors import InputError, in_one_line
 from armlab.recordings.table import Table
 
 READER_MODULE = "armlab.recordings.imports.matlab"
@@ -103,7 +103,7 @@ def _load_content(path: Path) -> dict[str, Any]:
     except NotImplementedError:
         raise InputError(f"{path} is of MATLAB version 7.3: save it with `save(name, '-v7')`") from None
     except MAT_READ_ERRORS as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
+        reason = in_one_line(error) or type(error).__name__
         raise InputError(f"cannot read {path} as a .mat file: {reason[:200]}") from None
     return {name: value for name, value in content.items() if not name.startswith("__") and isinstance(name, str)}
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO, Any
 
-from armlab.common.errors import InputError
+from armlab.common.errors import InputError, in_one_line
 
 PACKED_SUFFIXES = (".gz", ".bz2", ".xz", ".zip", ".zst", ".zstd")
 
@@ -29,7 +29,7 @@ def unpacked(path: Path) -> Iterator[Path]:
             with _open(path) as packed, inside.open("wb") as out:
                 shutil.copyfileobj(packed, out)
         except _unpack_errors() as error:
-            raise InputError(f"cannot unpack {path}: {' '.join(str(error).split())[:200]}") from None
+            raise InputError(f"cannot unpack {path}: {in_one_line(error)[:200]}") from None
         try:
             yield inside
         except InputError as error:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError, UndecidedError
+from armlab.common.errors import InputError, UndecidedError, in_one_line
 from armlab.common.settings import suggest_name
 from armlab.recordings.imports.ros_messages import (
     COMMAND_TYPES,
@@ -31,7 +31,7 @@ from armlab.recordings.recording import Finding
 from armlab.recordings.table import Table
 from armlab.recordings.text_rows import Progress, silent
 
-TOLD_MESSAGES = 50_000
+PROGRESS_MESSAGES = 50_000  # from one line of progress to the next
 BAG_READ_ERRORS = (
     ValueError,
     TypeError,
@@ -142,7 +142,7 @@ def _read_series(
                 raise InputError(f"the states on {topics[0]} hold the commands: leave out --command-topic")
             return states, _read_topic(reader, commands, parse_command, joints, progress)
     except (AnyReaderError, Ros1Error, Ros2Error, SerdeError, SqliteError, *BAG_READ_ERRORS) as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
+        reason = in_one_line(error) or type(error).__name__
         raise InputError(f"cannot read {path} as a bag of joint states: {reason[:200]}") from None
 
 
@@ -187,7 +187,7 @@ def _read_topic(reader: Any, topic: str, parse: Parser, joints: Sequence[str], p
     for place, (link, time, raw) in enumerate(reader.messages(connections=links)):
         message = reader.deserialize(raw, link.msgtype)
         numbers = parse(message, link.msgtype, topic, joints)
-        if place % TOLD_MESSAGES == TOLD_MESSAGES - 1:
+        if place % PROGRESS_MESSAGES == PROGRESS_MESSAGES - 1:
             progress(f"{topic}: {place + 1:,} messages read")
         names = tuple(numbers)
         if names not in kinds:
@@ -204,12 +204,12 @@ def _read_topic(reader: Any, topic: str, parse: Parser, joints: Sequence[str], p
         columns = [names.index(name) for name in held]
         values[places[:, None], columns] = np.frombuffer(kind.values).reshape(len(places), len(held))
         of_robot[places] = True
-    written, told = np.array(recorded, dtype=np.int64), np.array(stamps, dtype=np.int64)
-    stamped = bool(len(told)) and bool(np.any(told != told[0]))
-    delay = int(np.median(written - told)) if stamped else None
+    written, headers = np.array(recorded, dtype=np.int64), np.array(stamps, dtype=np.int64)
+    stamped = bool(len(headers)) and bool(np.any(headers != headers[0]))
+    delay = int(np.median(written - headers)) if stamped else None
     if not of_robot.all():
-        written, told, values = written[of_robot], told[of_robot], values[of_robot]
-    times, joined = _join_messages(told if stamped else written, values)
+        written, headers, values = written[of_robot], headers[of_robot], values[of_robot]
+    times, joined = _join_messages(headers if stamped else written, values)
     return Series(names, times, joined, delay, int((~of_robot).sum()))
 
 
