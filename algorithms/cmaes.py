@@ -43,7 +43,7 @@ from cmaes import CMA
 
 from algorithms.contract import Box, as_loss
 from algorithms.leaders import Leaders, leader, no_leaders, promote
-from algorithms.ranges import Positive
+from algorithms.parameter_types import Positive
 from armlab.common.arrays import Array
 
 

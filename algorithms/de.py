@@ -31,8 +31,7 @@ from annotated_types import Interval
 from numpy.typing import NDArray
 
 from algorithms.contract import Box, as_loss
-from algorithms.ranges import Share
-from algorithms.readings import OURS, Reading
+from algorithms.parameter_types import OURS, Reading, Share
 from armlab.common.arrays import Array
 
 

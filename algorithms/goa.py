@@ -33,8 +33,7 @@ import numpy as np
 
 from algorithms.contract import Box, as_loss
 from algorithms.leaders import Leaders, leader, no_leaders, promote
-from algorithms.ranges import NotNegative, Positive
-from algorithms.readings import OURS, Reading
+from algorithms.parameter_types import OURS, NotNegative, Positive, Reading
 from armlab.common.arrays import Array
 
 PAIR_COORDINATES = 2**15  # 256 KiB an array

@@ -31,8 +31,7 @@ import numpy as np
 
 from algorithms.contract import Box, as_loss
 from algorithms.leaders import Leaders, leader, no_leaders, promote
-from algorithms.ranges import NotNegative
-from algorithms.readings import OURS, Reading
+from algorithms.parameter_types import OURS, NotNegative, Reading
 from armlab.common.arrays import Array
 
 

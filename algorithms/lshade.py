@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from algorithms.contract import Box, as_loss
-from algorithms.ranges import NotNegative
+from algorithms.parameter_types import NotNegative
 from armlab.common.arrays import Array
 
 MEMORY_SPREAD = 0.1  # of both distributions about a memory entry

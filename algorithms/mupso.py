@@ -37,8 +37,7 @@ import numpy as np
 from annotated_types import Ge
 
 from algorithms.contract import Box, uniform_points
-from algorithms.ranges import NotNegative, Positive
-from algorithms.readings import OURS, TextReading
+from algorithms.parameter_types import OURS, NotNegative, Positive, TextReading
 from algorithms.spso import Swarm, fly, global_best, land, new_swarm
 from armlab.common.arrays import Array
 

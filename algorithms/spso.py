@@ -30,8 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from algorithms.contract import Box, as_loss
-from algorithms.ranges import NotNegative, Positive
-from algorithms.readings import OURS, TextReading
+from algorithms.parameter_types import OURS, NotNegative, Positive, TextReading
 from armlab.common.arrays import Array
 
 

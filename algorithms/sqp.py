@@ -28,8 +28,8 @@ from scipy.optimize import minimize
 
 from algorithms.contract import Box, uniform_points
 from algorithms.driver import clip
+from algorithms.parameter_types import NotNegative, Positive, Share
 from algorithms.peers.peer import GradientPeer, Inquire, Start
-from algorithms.ranges import NotNegative, Positive, Share
 from algorithms.spso import SPSO
 from armlab.common.arrays import Array
 from armlab.common.derivatives import Derivatives, Question

@@ -28,14 +28,12 @@ whale.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from algorithms.contract import Box
 from algorithms.leaders import Leaders, leader, no_leaders, promote
-from algorithms.ranges import NotNegative
-from algorithms.readings import OURS, Reading
+from algorithms.parameter_types import OURS, NotNegative, Reading
 from armlab.common.arrays import Array
 
 
@@ -136,7 +134,7 @@ def _encircle(state: WOAState, random_whales: Array, prey: Array) -> Array:
     return X
 
 
-def _spiral(X: Array, prey: Array, turn: Any, b: float) -> Array:
+def _spiral(X: Array, prey: Array, turn: Array | float, b: float) -> Array:
     """|X* - X| exp(b l) cos(2 pi l) + X* (eq. 2.5); turn is l, (n, 1), or one number for one whale."""
     distance: Array = np.abs(prey - X)
     distance *= np.exp(b * turn) * np.cos(2.0 * np.pi * turn)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from algorithms.contract import AnyAlgorithm, Box, BrokenContractError, as_loss
 from algorithms.driver import DerivativeSource, Result, minimise
-from algorithms.readings import OURS
+from algorithms.parameter_types import OURS
 from algorithms.registry import load
 from armlab.common.arrays import Array
 from armlab.common.derivatives import Derivatives, Question

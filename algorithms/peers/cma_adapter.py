@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import cma
 import numpy as np
 
+from algorithms.parameter_types import Positive
 from algorithms.peers.peer import Evaluate, Peer, Start
-from algorithms.ranges import Positive
 
 
 @dataclass(frozen=True)

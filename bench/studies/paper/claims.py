@@ -6,12 +6,13 @@ from typing import Any, Literal
 
 import pandas as pd
 
+from algorithms.parameter_types import OURS
 from bench.printed import Printed
 from bench.studies.mutations import MutationHistory
 from bench.studies.paper.identification import BestRun, SimulatedIdentification
 from bench.studies.paper.literal import READINGS, Identifiability, Reading, identifiability, literal_matrix
 from bench.studies.paper.published import PublishedReading
-from bench.studies.paper.ranking import OURS, Standing
+from bench.studies.paper.ranking import Standing
 from bench.tables import summary_table, times_table
 
 Verdict = Literal["reproduced", "not reproduced", "cannot be checked"]

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import kendalltau
 
+from algorithms.parameter_types import OURS
 from bench.printed import PrintedRow, display_name
 from bench.statistics import is_feasible
 from bench.studies.mutations import MutationHistory
@@ -22,7 +23,7 @@ from bench.studies.paper.claims import (
     verdict_if,
 )
 from bench.studies.paper.claims_swarm_size import size_duels
-from bench.studies.paper.ranking import OURS, READINGS, SUBJECT, Standing, count_duels, frames_by_reading
+from bench.studies.paper.ranking import READINGS, SUBJECT, Standing, count_duels, frames_by_reading
 
 _STATISTICS = ("minimum", "average", "standard_deviation")
 _MISSING_CONVENTIONS = "missing: search box, duration, samples, weight y, limits, scaling and choice of the columns"

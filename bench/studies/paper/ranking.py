@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from algorithms.parameter_types import OURS
 from bench.printed import display_name
 from bench.statistics import is_feasible, quantile
 from bench.statistics.pairwise import Duel, duels_against_all
 
 SUBJECT = "mupso"
-OURS = "ours"
 READINGS = {OURS: "as here", "text": "the sources' text as printed", "program": "their authors' programs"}
 """Readings of the algorithms; one that an algorithm lacks is that of here. No program of MuPSO is published."""
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from algorithms.parameter_types import OURS
 from armlab.common.errors import InputError
 from armlab.common.files import write_whole
 from armlab.common.settings import Settings, settings_to_yaml
@@ -17,7 +18,7 @@ from bench.studies.mutations import MutationHistory, replay_mutations
 from bench.studies.paper.claims import Evidence, literal_readings
 from bench.studies.paper.identification import BestRun, find_best_run, simulate_identification
 from bench.studies.paper.published import published_readings
-from bench.studies.paper.ranking import OURS, SUBJECT, frames_by_reading, ranking_table, standings
+from bench.studies.paper.ranking import SUBJECT, frames_by_reading, ranking_table, standings
 from bench.studies.paper.settings import (
     Figure4Settings,
     Table1Settings,
