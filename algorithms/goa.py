@@ -31,7 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from algorithms.contract import Box, as_loss
+from algorithms.contract import Box
 from algorithms.leaders import Leaders, leader, no_leaders, promote
 from algorithms.parameter_types import OURS, NotNegative, Positive, Reading
 from armlab.common.arrays import Array
@@ -53,13 +53,17 @@ class GOAParams:
 
 @dataclass
 class GOAState:
+    """position, box: with the coordinate that the reading `program` may add as the last one.
+
+    seen: coordinates that the objective sees.
+    """
+
     params: GOAParams
     position: Array
     leaders: Leaders
     box: Box
+    seen: int
     horizon: int
-    extra: Array  # (n,): the coordinate that the reading `program` adds
-    extra_target: float = 0.0
     iteration: int = 0
 
 
@@ -71,28 +75,29 @@ class GOA:
 
     @staticmethod
     def init(params: GOAParams, population: Array, box: Box, horizon: int, rng: np.random.Generator) -> GOAState:
-        adds = params.reading == "program" and population.shape[1] % 2 == 1
-        extra = rng.uniform(-EXTRA_LIMIT, EXTRA_LIMIT, len(population)) if adds else np.zeros(0)
-        return GOAState(params, population.copy(), no_leaders(population, 1), box, horizon, extra)
+        position, seen = population.copy(), population.shape[1]
+        if params.reading == "program" and seen % 2 == 1:
+            position = np.column_stack([position, rng.uniform(-EXTRA_LIMIT, EXTRA_LIMIT, len(position))])
+            box = Box(np.append(box.lower, -EXTRA_LIMIT), np.append(box.upper, EXTRA_LIMIT))
+        return GOAState(params, position, no_leaders(position, 1), box, seen, horizon)
 
     @staticmethod
     def ask(state: GOAState) -> tuple[Array, GOAState]:
         if state.iteration > 0:
-            state.position = _hop_in_planes(state) if state.params.reading == "program" else _hop(state)
-        return state.position.copy(), state
+            state.position = _hop(state)
+        return state.position[:, : state.seen].copy(), state
 
     @staticmethod
     def tell(state: GOAState, X: Array, fitness: Array) -> GOAState:
-        if len(state.extra) and len(X) and as_loss(fitness).min() < state.leaders.fitness[0]:
-            state.extra_target = float(state.extra[as_loss(fitness).argmin()])
-        promote(state.leaders, X, fitness)
-        state.position[...] = X
+        state.position[:, : state.seen] = X
+        promote(state.leaders, state.position, fitness)
         state.iteration += 1
         return state
 
     @staticmethod
     def incumbent(state: GOAState) -> tuple[Array, float]:
-        return leader(state.leaders)
+        position, fitness = leader(state.leaders)
+        return position[: state.seen], fitness
 
     @staticmethod
     def finished(state: GOAState) -> bool:
@@ -101,14 +106,19 @@ class GOA:
 
 def _hop(state: GOAState) -> Array:
     """New positions (n, d): c^2 (ub - lb) / 2 times the social forces, from the target (eq. 2.7)."""
-    params, width = state.params, state.box.upper - state.box.lower
-    progress = min(state.iteration / max(state.horizon, 1), 1.0)
+    params, X, width = state.params, state.position, state.box.upper - state.box.lower
+    ahead = 1 if params.reading == "program" else 0
+    progress = min((state.iteration + ahead) / max(state.horizon + ahead, 1), 1.0)
     c = params.first_c - progress * (params.first_c - params.last_c)  # eq. 2.8
-    if params.reading == "text":
-        return np.asarray(c * (c * width / 2.0 * plain_forces(state.position, params)) + state.leaders.position[0])
-    forces = social_forces((state.position - state.box.lower) / width, params)
-    X: Array = c * (c * width / 2.0 * forces) + state.leaders.position[0]  # eq. 2.7
-    return X
+    if params.reading == "program":
+        forces = plane_forces(X, params)
+    elif params.reading == "text":
+        forces = plain_forces(X, params)
+    else:
+        forces = social_forces((X - state.box.lower) / width, params)
+    moved: Array = c * (c * width / 2.0 * forces) + state.leaders.position[0]  # eq. 2.7
+    moved[:, state.seen :] = np.clip(moved[:, state.seen :], -EXTRA_LIMIT, EXTRA_LIMIT)
+    return moved
 
 
 def plain_forces(X: Array, params: GOAParams) -> Array:
@@ -119,26 +129,15 @@ def plain_forces(X: Array, params: GOAParams) -> Array:
     return np.asarray((_social(np.abs(difference), params) * difference / distance).sum(axis=1))
 
 
-def _hop_in_planes(state: GOAState) -> Array:
-    """New positions (n, d) of the authors' program, plane by plane; moves the extra coordinate in place."""
-    params = state.params
-    progress = min((state.iteration + 1) / (state.horizon + 1), 1.0)
-    c = params.first_c - progress * (params.first_c - params.last_c)
-    X, width = state.position, state.box.upper - state.box.lower
-    target = state.leaders.position[0]
-    if len(state.extra):
-        X, width = np.column_stack([X, state.extra]), np.append(width, 2.0 * EXTRA_LIMIT)
-        target = np.append(target, state.extra_target)
-    moved = np.empty_like(X)
+def plane_forces(X: Array, params: GOAParams) -> Array:
+    """sum_j s(2 + (d_ij mod 2)) (x_j - x_i) / d_ij in each plane of two coordinates, (n, d) -> (n, d), d even."""
+    forces = np.empty_like(X)
     for k in range(0, X.shape[1], 2):
-        difference = X[None, :, k : k + 2] - X[:, None, k : k + 2]
+        difference = X[None, :, k : k + 2] - X[:, None, k : k + 2]  # x_j - x_i: (i, j, 2)
         distance = np.linalg.norm(difference, axis=2, keepdims=True)
-        force = _social(2.0 + np.mod(distance, 2.0), params) * difference / (distance + np.finfo(float).eps)
-        moved[:, k : k + 2] = c * (c * width[k : k + 2] / 2.0 * force.sum(axis=1)) + target[k : k + 2]
-    if len(state.extra):
-        state.extra = np.clip(moved[:, -1], -EXTRA_LIMIT, EXTRA_LIMIT)
-        moved = moved[:, :-1]
-    return np.ascontiguousarray(moved)
+        pull = _social(2.0 + np.mod(distance, 2.0), params) * difference / (distance + np.finfo(float).eps)
+        forces[:, k : k + 2] = pull.sum(axis=1)
+    return forces
 
 
 def social_forces(U: Array, params: GOAParams) -> Array:

@@ -146,7 +146,8 @@ def test_the_program_of_goa_works_on_planes_and_adds_a_coordinate_where_their_nu
                     total += width[d] * c / 2 * s * (other[d] - one[d]) / (distance + np.finfo(float).eps)
                 wanted[i][d] = c * total + points[best][d]
     np.testing.assert_allclose(moved, np.array(wanted)[:, :3], rtol=1e-12)
-    np.testing.assert_allclose(state.extra, np.clip(np.array(wanted)[:, 3], -EXTRA_LIMIT, EXTRA_LIMIT), rtol=1e-12)
+    extra = np.clip(np.array(wanted)[:, 3], -EXTRA_LIMIT, EXTRA_LIMIT)
+    np.testing.assert_allclose(state.position[:, 3], extra, rtol=1e-12)
 
 
 def test_the_text_of_de_keeps_a_target_that_is_equally_good():
