@@ -17,7 +17,9 @@ Other readings (`reading`):
 - `text`: a trial has to be better.
 - `program`, the authors' MATLAB: r1 is a random order of the population, r2 and r3 are the same order turned by 1 to 4
   places and again by another such number, so that one of them may be i; the mutant is x_r3 + F (x_r1 - x_r2); no
-  coordinate is forced.
+  coordinate is forced. Compared with public copies of its `deopt.m`, strategy 1, and `left_win.m`: turns, mutant,
+  crossover and the selection, in which an equal trial wins, agree. Its treatment of the box, a random place between
+  base and limit, is not part of the reading: the bound policy of the experiment decides here.
 
 How peers differ: scipy defaults to best/1/bin with dithered F, updates at once and polishes the end; pygmo
 defaults to rand/1/exp; mealpy has F = 0.1 and no forced coordinate; pymoo adds polynomial mutation.

@@ -22,7 +22,8 @@ Other readings (`reading`):
 - `program`, the authors' MATLAB: it works on pairs of coordinates, each as a plane of its own, with
   r_ij = 2 + (d_ij mod 2) and d_ij the distance in the plane, in the units of the coordinates; where their number is
   odd it adds one coordinate from -100 to 100 that the objective does not see; c = c_max - (t + 1) (c_max - c_min) /
-  (horizon + 1).
+  (horizon + 1). Compared with public copies of its `GOA.m` (demo V1.0): planes, remainder, extra coordinate, c and the
+  update of the target agree.
 
 How peers differ: mealpy multiplies by an extra normal number.
 """

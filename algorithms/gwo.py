@@ -18,6 +18,7 @@ Other readings (`reading`):
 - `text`: a falls to 0 at the last move, as the text says.
 - `program`, the authors' MATLAB: a leader that is overtaken is forgotten, not demoted, wolf by wolf; a falls by
   1 / (horizon + 1) of its way at each move; a leader that is not known yet stands at the origin of coordinates.
+  Compared with public copies of its `GWO.m`: the order of the three leaders, a, A, C and eq. 3.5-3.7 agree.
 
 It is drawn to the origin of coordinates, since C multiplies a position: a property of the equations.
 

@@ -19,7 +19,8 @@ Other readings (`reading`):
 - `text`: |A| is the length of the vector A, as the bars say, and a falls to 0 at the last move, as the text says.
 - `program`, the authors' MATLAB: one number A and one C for a whale; another random whale for each coordinate; whales
   move one after the other, so that a random whale may have moved already; l from (a2, 1] with a2 falling from -1
-  towards -2; a and a2 fall by 1 / (horizon + 1) of their way at each move.
+  towards -2; a and a2 fall by 1 / (horizon + 1) of their way at each move. Compared with public copies of its `WOA.m`:
+  A, C, l, p, the random whale of each coordinate and the order of the moves agree.
 
 It is drawn to the origin of coordinates, since C multiplies a position: a property of the equations.
 

@@ -1,6 +1,8 @@
 """Every statistic against a published example, an independent engine, or a case small enough to count by hand."""
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -216,6 +218,14 @@ def test_the_interval_of_superiority_holds_near_one_half_and_near_one() -> None:
         for repetitions, by_effect in by_repetitions.items():
             for effect, share in by_effect.items():
                 assert share >= 0.93 - 2 * 0.009, (name, repetitions, effect)  # two standard errors of the simulation
+
+
+def test_the_documentation_names_the_least_committed_coverage_of_each_distribution() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "comparing.md").read_text()
+    committed = json.loads((Path(__file__).parents[2] / "results" / "coverage.json").read_text())["superiority"]
+    for name, by_repetitions in committed.items():
+        least = min(share for by_effect in by_repetitions.values() for share in by_effect.values())
+        assert f"{100 * least:.1f} " in text, name
 
 
 def test_an_interval_of_superiority_has_a_width_and_one_end_where_all_pairs_agree() -> None:
