@@ -243,9 +243,8 @@ def salvage(damaged: Path, out: Path) -> int:
     if out.exists():
         raise InputError(f"{out} exists already: name a new file with --out")
     with _open_to_read(damaged) as source:
-        source._connection.execute(
-            "PRAGMA writable_schema = ON"
-        )  # else SQLite reads nothing of a file that is too short
+        # else SQLite reads nothing of a file that is too short
+        source._connection.execute("PRAGMA writable_schema = ON")
         found = _read_outcomes(source)
         first = next(found, None)
         if first is None:
@@ -257,10 +256,13 @@ def salvage(damaged: Path, out: Path) -> int:
 def copy_outcomes(part: Path, store: RunStore) -> int:
     """Copy the outcomes of another store that this one lacks, and why trials without one failed; returns their number.
 
-    Raises InputError for a file that is no run store.
+    Raises InputError for a file that is no run store, and for a trial that has another end in each.
     """
     with _open_to_read(part) as source, _errors_in_one_line(part):
         keys = source.keys("")
+        for key in keys:
+            if store.has(key) and not _same_end(source.figures(key), store.figures(key)):
+                raise InputError(f"trial {key[:12]} of {part} has another end in an earlier part")
         count = _write_outcomes(
             ((key, source.get(key), source.origins([key])[0]) for key in keys if not store.has(key)), store
         )
@@ -268,6 +270,11 @@ def copy_outcomes(part: Path, store: RunStore) -> int:
             failed = source._connection.execute("SELECT key, reason FROM failures").fetchall()
             store.note_failures([(key, reason) for key, reason in failed if not store.has(key)])
     return count
+
+
+def _same_end(one: OutcomeFigures, other: OutcomeFigures) -> bool:
+    """Whether value and violation agree; two values that are not numbers do."""
+    return bool(np.array_equal([one.value, one.violation], [other.value, other.violation], equal_nan=True))
 
 
 def store_origins(path: Path) -> list[str]:

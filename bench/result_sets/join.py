@@ -39,10 +39,15 @@ def _join_stores(parts: Sequence[Path], out: Path, any_versions: bool) -> Result
             raise InputError(f"there is no run store {part}")
     origins = {part: [json.loads(facts) for facts in store_origins(part)] for part in parts}
     _check_versions(origins, any_versions)
-    with open_store(out) as store:
-        for part in parts:
-            yield f"{copy_outcomes(part, store)} outcomes of {part} are new"
-        count = len(store.keys(""))
+    try:
+        with open_store(out) as store:
+            counts = [copy_outcomes(part, store) for part in parts]
+            count = len(store.keys(""))
+    except InputError:
+        out.unlink(missing_ok=True)
+        raise
+    for part, new in zip(parts, counts, strict=True):
+        yield f"{new} outcomes of {part} are new"
     yield f"{count} outcomes are in {out}"
     return {"outcomes": count, "files": [out]}
 
@@ -57,7 +62,8 @@ def _join_folders(parts: Sequence[Path], out: Path, any_versions: bool) -> Resul
 
 
 def join_sets(first: ResultSet, second: ResultSet) -> ResultSet:
-    """Both sets as one, the order of the first before that of the second; a trial that both have counts once.
+    """Both sets as one, the order of the first before that of the second; a trial that both have counts once, and one
+    that failed in one part and was finished in the other is finished.
 
     Raises InputError where the seeds differ, where a label stands for different settings, and where a trial has another
     end in each.
@@ -67,6 +73,9 @@ def join_sets(first: ResultSet, second: ResultSet) -> ResultSet:
         raise InputError(f"seeds {ours['seed']} and {theirs['seed']}: only runs of one seed are paired")
     merged = ours | {key: _merge(ours[key], theirs[key], key) for key in ("problem", "algorithms")}
     trials = pd.concat([first.trials, second.trials], ignore_index=True)
+    keys = pd.MultiIndex.from_frame(trials[TRIAL_COLUMNS])
+    failed = trials["failure"] != ""
+    trials = trials[~(failed & keys.isin(keys[~failed]))]
     repeated = trials[trials.duplicated(TRIAL_COLUMNS, keep=False)]
     differing = repeated.drop_duplicates([*TRIAL_COLUMNS, "value", "violation"]).duplicated(TRIAL_COLUMNS)
     if differing.any():

@@ -88,7 +88,7 @@ def properties_of_algorithms(names: Sequence[str]) -> list[AlgorithmProperties]:
 
 
 def stored_properties(name: str, store: RunStore) -> AlgorithmProperties | None:
-    """`measure_isolated`, from the store where the same code was measured before; None where it fails."""
+    """`measure_isolated`, from the store where the same code was measured before."""
     key = algorithm_fingerprint(find_algorithm(name, "properties"), __name__)
     content = store.measured(key)
     if content is not None:
@@ -100,10 +100,10 @@ def stored_properties(name: str, store: RunStore) -> AlgorithmProperties | None:
 
 
 def measure_isolated(name: str) -> AlgorithmProperties | None:
-    """Properties of one algorithm; None where it fails. Another package's code runs in a process of its own."""
+    """Properties of one algorithm. Another package's code runs in a process of its own; None where that fails."""
+    if is_our_code(name):
+        return properties_of_algorithms([name])[0]
     try:
-        if is_our_code(name):
-            return properties_of_algorithms([name])[0]
         with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
             return pool.submit(properties_of_algorithms, [name]).result()[0]
     except Exception:  # whatever a third party raises: its trials tell it

@@ -80,3 +80,37 @@ def test_two_ends_of_one_trial_are_refused(small: Path, halves: tuple[Path, Path
     table.to_csv(folders[1] / "trials.csv", index=False)
     message = refusal(drain, join_parts(folders, small.with_name("whole"), any_versions=False))
     assert message == "sphere, 5, 25, spso, 1 has another end in each part"
+
+
+def test_two_ends_of_one_trial_in_stores_are_refused_and_nothing_is_written(
+    small: Path, halves: tuple[Path, Path]
+) -> None:
+    other = small.with_name("other.sqlite")
+    with sqlite3.connect(halves[0]) as source, sqlite3.connect(other) as copy:
+        source.backup(copy)
+        copy.execute("UPDATE trials SET value = value * 2")
+    out = small.with_name("whole.sqlite")
+    assert refusal(drain, join_parts([halves[0], other], out, any_versions=True)).endswith(
+        "another end in an earlier part"
+    )
+    assert not out.exists()
+
+
+def test_a_trial_that_failed_in_one_folder_and_was_finished_in_the_other_is_finished(
+    small: Path, halves: tuple[Path, Path]
+) -> None:
+    folders = [small.with_name(name) for name in ("left", "right")]
+    for folder in folders:
+        share_results(small, halves[0], "csv", folder)
+    finished = read_results(folders[1], Path("none"))
+    trials, curves = (pd.read_csv(folders[0] / f"{table}.csv") for table in ("trials", "curves"))
+    trials["failure"] = trials["failure"].astype("str").where(trials["repetition"] != 1, "it took too long")
+    trials["failure"] = trials["failure"].replace("nan", "")
+    trials.loc[trials["repetition"] == 1, ["value", "violation"]] = [float("nan"), float("inf")]
+    trials.to_csv(folders[0] / "trials.csv", index=False)
+    curves[curves["repetition"] != 1].to_csv(folders[0] / "curves.csv", index=False)
+    whole = small.with_name("whole")
+    drain(join_parts(folders, whole, any_versions=False))
+    joined = read_results(whole, Path("none"))
+    assert joined.gaps == ()
+    assert sorted(joined.trials["value"]) == sorted(finished.trials["value"])
