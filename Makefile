@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.c armlab/effects/drive_train_build.py \
 	armlab/diagnosis/motion/joint_replay.c armlab/diagnosis/motion/joint_replay_build.py \
-	armlab/concealed/servo/servo_arm.c armlab/concealed/servo/servo_arm_build.py
+	armlab/proof/blind/servo/servo_arm.c armlab/proof/blind/servo/servo_arm_build.py
 
 .DEFAULT_GOAL := help
 .PHONY: help install install-dev table3 figure2 figure3 paper study search-space tune landscape best-known real real-leave-one-out real-motion real-conditioning relations prove-changes test suite lint structure table3-time diagnosis-time profile speed regression fuzz logs hostile prove prove-quick docs pictures lock clean
@@ -143,5 +143,5 @@ hostile: .venv/dev ## damaged input for the commands: tests/hostile_outcomes.csv
 clean: ## everything that was made here, the environment included
 	rm -rf .venv .armlab build site jupyter_execute *.egg-info problem/_kernel.c problem/*.so armlab/effects/_drive_train.c armlab/effects/*.so \
 		armlab/diagnosis/motion/_joint_replay.c armlab/diagnosis/motion/*.so \
-		armlab/concealed/servo/_servo_arm.c armlab/concealed/servo/*.so
+		armlab/proof/blind/servo/_servo_arm.c armlab/proof/blind/servo/*.so
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -7,6 +7,6 @@ setup(
         "problem/kernel_build.py:ffibuilder",
         "armlab/effects/drive_train_build.py:ffibuilder",
         "armlab/diagnosis/motion/joint_replay_build.py:ffibuilder",
-        "armlab/concealed/servo/servo_arm_build.py:ffibuilder",
+        "armlab/proof/blind/servo/servo_arm_build.py:ffibuilder",
     ]
 )

@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from algorithms.driver import minimise
     from algorithms.registry import load as load_algorithm
     from armlab.common.errors import InputError
-    from armlab.diagnosis.compare.comparison import Comparison, compare
-    from armlab.diagnosis.diagnose import diagnose
+    from armlab.diagnosis.changes.comparison import Comparison, compare
     from armlab.diagnosis.formats import read_verdict_file as read_verdict
     from armlab.diagnosis.result import Diagnosis
     from armlab.flows import ExperimentResult, Prediction, identify, predict, run_experiment, search
     from armlab.identification.model import Model
     from armlab.recordings.load import load_recording as read_recording
     from armlab.recordings.recording import Recording
+    from armlab.report.diagnose import diagnose
     from problem.arm import Arm
     from problem.registry import parse_problem
     from problem.robot_file import load_arm as read_robot
@@ -36,15 +36,15 @@ if TYPE_CHECKING:
 _PLACES = {
     "Arm": "problem.arm:Arm",
     "Box": "algorithms.contract:Box",
-    "Comparison": "armlab.diagnosis.compare.comparison:Comparison",
+    "Comparison": "armlab.diagnosis.changes.comparison:Comparison",
     "Diagnosis": "armlab.diagnosis.result:Diagnosis",
     "ExperimentResult": "armlab.flows:ExperimentResult",
     "InputError": "armlab.common.errors:InputError",
     "Model": "armlab.identification.model:Model",
     "Prediction": "armlab.flows:Prediction",
     "Recording": "armlab.recordings.recording:Recording",
-    "compare": "armlab.diagnosis.compare.comparison:compare",
-    "diagnose": "armlab.diagnosis.diagnose:diagnose",
+    "compare": "armlab.diagnosis.changes.comparison:compare",
+    "diagnose": "armlab.report.diagnose:diagnose",
     "identify": "armlab.flows:identify",
     "load_algorithm": "algorithms.registry:load",
     "minimise": "algorithms.driver:minimise",

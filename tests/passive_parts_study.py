@@ -20,7 +20,7 @@ import yaml
 from scipy.stats import binomtest, fisher_exact
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.recordings.load import load_recording
 from problem.mjcf import compile_mjcf
 from problem.motion import Motion

@@ -78,7 +78,7 @@ def time_stages(recording: Path, out: Path, as_read: bool) -> StageClock:
     """Diagnoses a recording. Raises InputError where it cannot be used."""
     os.environ.update(ONE_THREAD)  # read when numpy is imported, which comes now
     clock = StageClock()
-    from armlab.diagnosis.report.write import diagnose_recording
+    from armlab.report.torque.write import diagnose_recording
 
     clock.begin(SECOND_STAGE)
     list(diagnose_recording(recording, out, baseline=None, seed=0, as_read=as_read, progress=clock.tell))

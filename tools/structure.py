@@ -12,7 +12,7 @@ import sys
 from collections import defaultdict
 from pathlib import Path
 
-ROOTS = ("problem", "algorithms", "bench", "armlab", "recordings", "identification", "diagnosis", "concealed")
+ROOTS = ("problem", "algorithms", "bench", "armlab")
 IRREGULAR = {
     "begun",
     "bent",
@@ -74,7 +74,7 @@ IRREGULAR = {
     "written",
 }
 NOT_PARTICIPLES = {"cut", "put", "read", "run", "set", "split", "let", "left", "bound", "seed", "speed", "need", "feed"}
-LIBRARIES = ("armlab/effects/", "diagnosis/effects/", "recordings/vocabulary", "armlab/concealed/", "concealed/")
+LIBRARIES = ("armlab/effects/", "armlab/proof/blind/")
 
 
 def main() -> None:
@@ -140,7 +140,7 @@ def effect_ids(sources: dict[Path, str]) -> list[str]:
 
 def modules_of_a_diagnosis(tree: Path) -> int:
     """Modules of the project that `armlab diagnose` loads, its report included, package files left out."""
-    place = "armlab.diagnosis.report.write" if (tree / "armlab").is_dir() else "diagnosis.command"
+    place = "armlab.report.torque.write" if (tree / "armlab").is_dir() else "diagnosis.command"
     code = (
         f"import sys, {place}; from collections import Counter; "
         f"print(sum(name.split('.')[0] in {ROOTS!r} and hasattr(module, '__file__') "

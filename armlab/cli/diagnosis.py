@@ -136,18 +136,18 @@ def diagnose(
     if old is not None and is_motion_only(old) != motion_only:
         raise InputError("--compare: one recording has torque, the other is motion only; they cannot be compared")
     if motion_only and old is None:
-        from armlab.diagnosis.motion.write import diagnose_motion_recording
+        from armlab.report.motion.write import diagnose_motion_recording
 
         return diagnose_motion_recording(recordings[0], out, tell_progress, changes, mcap, tables, verbose)
     if motion_only and old is not None:
-        from armlab.diagnosis.motion.compare_write import compare_motion_recordings
+        from armlab.report.motion.compare_write import compare_motion_recordings
 
         return compare_motion_recordings((old, *recordings), out, tell_progress)
     if old is not None:
-        from armlab.diagnosis.compare.report import compare_recordings
+        from armlab.report.changes.report import compare_recordings
 
         return compare_recordings((old, *recordings), out, baseline, seed, _parse_dates(dates), tell_progress)
-    from armlab.diagnosis.report.write import diagnose_recording
+    from armlab.report.torque.write import diagnose_recording
 
     return diagnose_recording(
         recordings[0], out, baseline, seed, without, changes, as_read, only_setup, tell_progress, mcap, tables, verbose
@@ -246,9 +246,9 @@ def real(
     --leave-one-out leave_one_out.md and .csv instead.
     """
     from armlab.common.errors import InputError
-    from armlab.diagnosis.real_arms.leave_one_out import leave_arms_out
-    from armlab.diagnosis.real_folders.bench import FolderBench
-    from armlab.diagnosis.real_folders.parts import PublicBench, bench_real
+    from armlab.proof.open.real_arms.leave_one_out import leave_arms_out
+    from armlab.proof.open.real_folders.bench import FolderBench
+    from armlab.proof.open.real_folders.parts import PublicBench, bench_real
     from armlab.recordings.public import local_copies
 
     if leave_one_out and (peers is not None or facts is not None or part == "folders"):
@@ -274,8 +274,8 @@ def real_motion(results: Path, recordings: Path, peer: str | None, peer_windows:
     An SO-101 arm against its public MJCF, and an XL330 servo at four gains, pair by pair. Writes motion.md.
     """
     from armlab.common.errors import InputError
-    from armlab.diagnosis.motion.peer import WINDOWS
-    from armlab.diagnosis.motion.real import bench_real_motion
+    from armlab.proof.open.motion.peer import WINDOWS
+    from armlab.proof.open.motion.real import bench_real_motion
 
     if peer is None and peer_windows is not None:
         raise InputError("--peer-windows has no part without --peer sysid: give both")
@@ -299,8 +299,8 @@ def relations(
     others. Writes relations.md; an interrupted command continues. Parts: the short relations, or those of stretches
     that are independent of each other, between which nothing has changed (null-pairs.md).
     """
-    from armlab.diagnosis.relations.bench import bench_relations
-    from armlab.diagnosis.relations.relations import NULL_PAIRS, QUICK, RELATIONS
+    from armlab.proof.open.relations.bench import bench_relations
+    from armlab.proof.open.relations.relations import NULL_PAIRS, QUICK, RELATIONS
 
     names = {"all": tuple(RELATIONS), "quick": QUICK, "null-pairs": NULL_PAIRS}[part]
     return bench_relations(results, recordings, folders, only, names, tell_progress)
@@ -336,7 +336,7 @@ def real_concealed(
     concealed.csv and concealed.svg; with --seed the tables cases.csv, claims.csv and recordings.csv, which
     `armlab prove --tier real` scores.
     """
-    from armlab.diagnosis.real_concealed.at_random import (
+    from armlab.proof.open.real_concealed.at_random import (
         REAL_ARMS,
         RandomCases,
         conceal_at_random,
@@ -344,7 +344,7 @@ def real_concealed(
         judge_cases,
         make_cases,
     )
-    from armlab.diagnosis.real_concealed.report import conceal_in_recordings
+    from armlab.proof.open.real_concealed.report import conceal_in_recordings
 
     steps = [name for name, given in (("--make", made), ("--observation", observation), ("--judge", answered)) if given]
     if len(steps) > 1:
@@ -385,7 +385,7 @@ def confusability(
     ROBOT: a file or a built-in name. TRAJECTORY: a CSV with t, q1, ... in s and rad, a recording folder, or the name
     of a trajectory in results/best_known.json.
     """
-    from armlab.diagnosis.confusability.report import write_card
+    from armlab.report.confusability.report import write_card
 
     return write_card(robot, trajectory, joints, noise, out)
 

@@ -24,7 +24,7 @@ KERNELS = {
     "problem._kernel": "condition numbers",
     "armlab.effects._drive_train": "play and springs of drive trains",
     "armlab.diagnosis.motion._joint_replay": "replay of position servos",
-    "armlab.concealed.servo._servo_arm": "simulated servos of the proof",
+    "armlab.proof.blind.servo._servo_arm": "simulated servos of the proof",
 }
 MAX_ERROR = 1e-9  # relative, of what the self-test computes twice
 

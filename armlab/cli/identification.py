@@ -89,7 +89,7 @@ def coverage(experiments: int, seed: int, results: Path, part: str) -> Iterator[
     coverage.json.
     """
     from armlab.common.files import write_texts
-    from armlab.identification.coverage import measure_coverage
+    from armlab.proof.open.coverage import measure_coverage
     from bench.statistics.superiority import describe_coverage, superiority_coverage
 
     path = results / "coverage.json"
@@ -113,7 +113,7 @@ def real_conditioning(results: Path, recordings: Path, only: tuple[str, ...]) ->
     Identifies each public recording from many windows and predicts the runs that validate. Writes conditioning.md,
     two tables and a picture.
     """
-    from armlab.identification.conditioning.study import study_conditioning
+    from armlab.proof.open.conditioning.study import study_conditioning
 
     return study_conditioning(results, recordings, only, tell_progress)
 
@@ -162,7 +162,7 @@ def payload(
     LOADED: a recording folder. Without --without the robot file stands for the arm without the load, and what else it
     lacks is found as `diagnose` finds it.
     """
-    from armlab.diagnosis.load import nominal_payload_lines
+    from armlab.diagnosis.torque.carried_load import nominal_payload_lines
     from armlab.identification.payload import PayloadSetting, Place, payload_lines
 
     setting = PayloadSetting(Place(link, centre), counterbalance, cutoff_hz)

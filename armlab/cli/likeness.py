@@ -31,12 +31,11 @@ def likeness(
     """
     from armlab.common.errors import InputError
     from armlab.common.files import write_texts
-    from armlab.concealed.field.likeness_sets import make_field_nulls, make_realistic_nulls
-    from armlab.concealed.sealed import code_commit
-    from armlab.identification.likeness.page import likeness_texts
-    from armlab.identification.likeness.pictures import Pictured, draw_pictures
-    from armlab.identification.likeness.real_arms import drawable_folders, real_folders
-    from armlab.identification.likeness.study import (
+    from armlab.proof.blind.sealed import code_commit
+    from armlab.proof.open.likeness.page import likeness_texts
+    from armlab.proof.open.likeness.pictures import Pictured, draw_pictures
+    from armlab.proof.open.likeness.real_arms import drawable_folders, real_folders
+    from armlab.proof.open.likeness.study import (
         LOOKS_FILE,
         compare,
         look_of,
@@ -45,6 +44,7 @@ def likeness(
         read_real_arms,
         read_simulated_arms,
     )
+    from armlab.proof.tiers.likeness_sets import make_field_nulls, make_realistic_nulls
     from armlab.recordings.public import LOCAL_COPIES_VARIABLE, local_copies
 
     local = local_copies()

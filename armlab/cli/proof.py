@@ -40,11 +40,11 @@ def ablate(
     """
     from functools import partial
 
-    from armlab.concealed.ablation import AblationSettings
-    from armlab.concealed.ablation import ablate as run_ablation
-    from armlab.diagnosis.ablation import verdicts_without_each
     from armlab.diagnosis.settings import Settings, vary
     from armlab.diagnosis.tuning import parse_change
+    from armlab.proof.open.ablation import verdicts_without_each
+    from armlab.proof.tiers.guards import AblationSettings
+    from armlab.proof.tiers.guards import ablate as run_ablation
 
     for change in changes:  # refused before hours of work
         vary(Settings(), *parse_change(change))
@@ -74,10 +74,10 @@ def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int)
     from tqdm import tqdm
 
     from armlab.cli.second_motion import plan_second_motion
-    from armlab.concealed.loop.case import Tools
-    from armlab.concealed.loop.page import Seals, write_page
-    from armlab.concealed.loop.run import LoopSettings, close_loop, play_cases, read_results, seal_loop
-    from armlab.diagnosis.next.second_motion import suspect_rivals, write_diagnosis
+    from armlab.proof.blind.loop.case import Tools
+    from armlab.proof.blind.loop.page import Seals, write_page
+    from armlab.proof.blind.loop.run import LoopSettings, close_loop, play_cases, read_results, seal_loop
+    from armlab.proof.open.second_motion import suspect_rivals, write_diagnosis
 
     settings = LoopSettings(cases, seed)
     answers = seal_loop(settings, out)
@@ -114,8 +114,8 @@ def conceal(
     """
     from tqdm import tqdm
 
-    from armlab.concealed.sealed import MANIFEST_FILE
-    from armlab.concealed.torque import TORQUE, make_set_settings
+    from armlab.proof.blind.sealed import MANIFEST_FILE
+    from armlab.proof.tiers.torque import TORQUE, make_set_settings
 
     settings = make_set_settings(cases, seed, tier, kind, development)
     for _ in tqdm(TORQUE.conceal(settings, out, jobs), total=cases, unit="case", desc="concealed"):
@@ -154,15 +154,15 @@ def oracle(
     """
     from tqdm import tqdm
 
-    from armlab.concealed.naming_oracle_page import (
+    from armlab.proof.blind.score.scoring import PAGE_FILE, SCORE_FILE, write_page_again
+    from armlab.proof.tiers.naming_oracle_page import (
         ask_about_set,
         collect_answers,
         draw_cases,
         read_scored_effects,
         write_oracle,
     )
-    from armlab.concealed.score.scoring import PAGE_FILE, SCORE_FILE, write_page_again
-    from armlab.concealed.torque import make_set_settings
+    from armlab.proof.tiers.torque import make_set_settings
 
     out = out or scored
     if out is None:
@@ -197,7 +197,7 @@ def score(folder: Path, verdicts: Path | None, manifest: str | None, out: Path |
     FOLDER: a concealed set. Without --verdicts a folder with a score, whose
     page score.md is written again from the tables beside it.
     """
-    from armlab.concealed.score.scoring import PAGE_FILE, format_lines, score_set, write_page_again
+    from armlab.proof.blind.score.scoring import PAGE_FILE, format_lines, score_set, write_page_again
 
     if verdicts is None:
         if manifest or out:
@@ -213,8 +213,8 @@ def score(folder: Path, verdicts: Path | None, manifest: str | None, out: Path |
 
 def _write_summary_again(results: Path) -> Iterator[str]:
     """Of a folder of judged results, which has a log; other folders have no summary."""
-    from armlab.concealed.log_page import LOG_FILE
-    from armlab.concealed.summary_page import write_summary
+    from armlab.proof.blind.log_page import LOG_FILE
+    from armlab.proof.tiers.summary_page import write_summary
 
     if (results / LOG_FILE).is_file():
         yield f"wrote {write_summary(results)}"
@@ -255,12 +255,12 @@ def calibrate_names(
     Uses development sets alone, and checks the probabilities on cases that are left out in turn, of real recordings all
     of one together (extra `dev`).
     """
-    from armlab.concealed.real.weighed import read_weighed_real
-    from armlab.concealed.score.weighed import read_weighed
-    from armlab.concealed.servo.score import read_weighed_motion
-    from armlab.diagnosis.naming.calibrate import Finding, calibrate
-    from armlab.diagnosis.naming.calibration_page import calibration_lines, write_calibration
-    from armlab.diagnosis.naming.choice import Example
+    from armlab.diagnosis.torque.names.choice import Example
+    from armlab.proof.blind.real.weighed import read_weighed_real
+    from armlab.proof.blind.score.weighed import read_weighed
+    from armlab.proof.blind.servo.score import read_weighed_motion
+    from armlab.proof.open.calibration.calibrate import Finding, calibrate
+    from armlab.proof.open.calibration.calibration_page import calibration_lines, write_calibration
 
     if not sets and not motion_sets and not real_sets:
         raise click.UsageError("nothing to learn from: give --set SET VERDICTS, --motion WORK or --real TABLES")
@@ -295,7 +295,7 @@ def calibrate_unknown(claims: tuple[Path, ...], unseen: tuple[Path, ...], out: P
 
     From judged sets of earlier engines, which judge no more; each is left out in turn to see what the limit does.
     """
-    from armlab.concealed.score.unknown_limit import check_limit, limit_lines, limit_of, read_claims, write_limit
+    from armlab.proof.blind.score.unknown_limit import check_limit, limit_lines, limit_of, read_claims, write_limit
 
     learnt = [read_claims(each) for each in claims]
     scores = check_limit(learnt, [read_claims(each) for each in unseen])
@@ -317,7 +317,8 @@ def calibrate_reading(work: Path, out: Path) -> Iterator[str]:
     into --work. Each arm is judged once more with the bound that the others make.
     """
     from armlab.common.errors import InputError
-    from armlab.diagnosis.real_folders.reading_bound import (
+    from armlab.proof.open.likeness.real_arms import real_folders
+    from armlab.proof.open.real_folders.reading_bound import (
         best_wrong_readings,
         bound_lines,
         bound_of,
@@ -325,7 +326,6 @@ def calibrate_reading(work: Path, out: Path) -> Iterator[str]:
         share_told,
         write_bound,
     )
-    from armlab.identification.likeness.real_arms import real_folders
     from armlab.recordings.public import LOCAL_COPIES_VARIABLE, local_copies
     from armlab.recordings.reading.tuning import ReadingTuning
 
@@ -372,8 +372,8 @@ def prove(
     Tier by tier: torque, how recordings are read, motion only, real recordings with something concealed. Logs the
     scores. After an interruption the same command continues (extra `engines`).
     """
-    from armlab.concealed.tiers import TIERS, prove_tiers
-    from armlab.concealed.torque import choose_proof
+    from armlab.proof.tiers.tiers import TIERS, prove_tiers
+    from armlab.proof.tiers.torque import choose_proof
 
     proof = choose_proof(quick, development, cases, nulls)
     folder = work or Path(".armlab/proof") / proof.name
@@ -386,7 +386,7 @@ def _choose_set(seed: int | None, work: Path | None, kind: str) -> tuple[int, Pa
 
     The third is the commit that the set judges, None for any other seed.
     """
-    from armlab.concealed.sealed import code_commit, judged_commit, judged_seed
+    from armlab.proof.blind.sealed import code_commit, judged_commit, judged_seed
 
     chosen = judged_seed(code_commit()) if seed is None else seed
     return chosen, work or Path(f".armlab/{kind}/{chosen}"), judged_commit(chosen)
@@ -424,7 +424,7 @@ def prove_changes(
     Makes pairs of recordings of one robot, with nothing or one thing changed, compares them blindly, and scores. After
     an interruption the same command continues (extra `engines`).
     """
-    from armlab.concealed.pairs.prove import CHANGES, PairSet
+    from armlab.proof.tiers.changes import CHANGES, PairSet
 
     chosen, folder, commit = _choose_set(seed, work, "changes")
     return CHANGES.prove(PairSet(nulls, changed, chosen), folder, results or folder / "score", jobs, commit)
@@ -452,7 +452,7 @@ def prove_field(
     Makes recordings with every law at once and a rest that no law explains, diagnoses or compares them blindly, and
     scores physics, reading and changes. After an interruption the same command continues (extra `engines`).
     """
-    from armlab.concealed.field.prove import FIELD_TIER, FieldSet
+    from armlab.proof.tiers.field import FIELD_TIER, FieldSet
 
     chosen, folder, commit = _choose_set(seed, work, "field")
     chosen_set = FieldSet(cases, nulls, mistakes, pairs, chosen)
@@ -487,7 +487,7 @@ def prove_setup(
     Puts mistakes into simulated and public recordings, diagnoses them blindly, and scores: physics, too, where some is
     hidden. After an interruption the same command continues (extra `engines`).
     """
-    from armlab.concealed.setup.prove import SETUP, SetupSet
+    from armlab.proof.tiers.reading import SETUP, SetupSet
 
     chosen, folder, commit = _choose_set(seed, work, "setup")
     cases = SetupSet(simulated, real, nulls, chosen, folders)
@@ -507,7 +507,7 @@ def prove_motion(
     Simulates arms with position servos whose joints stick, on an engine of its own, diagnoses commands and positions
     blindly, and scores. After an interruption the same command continues.
     """
-    from armlab.concealed.servo.prove import MOTION, MotionSet
+    from armlab.proof.tiers.motion import MOTION, MotionSet
 
     chosen, folder, commit = _choose_set(seed, work, "motion")
     return MOTION.prove(MotionSet(cases, nulls, chosen), folder, results or folder / "score", jobs, commit)

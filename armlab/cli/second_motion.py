@@ -6,9 +6,9 @@ Apart from the click commands, since it imports the diagnosis, and `armlab --hel
 from pathlib import Path
 from typing import get_args
 
-from armlab.concealed.loop.case import Forecast, SecondMotion
 from armlab.diagnosis.next.motion import Budget
-from armlab.diagnosis.next.second_motion import MotionKind, design_second_motion
+from armlab.proof.blind.loop.case import Forecast, SecondMotion
+from armlab.proof.open.second_motion import MotionKind, design_second_motion
 
 SECOND_DURATION_S = 2.0  # so short that a random motion often leaves it open: the difficulty, alike for all kinds
 SECOND_HARMONICS = 6

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 
 from armlab.common.arrays import Array
 from armlab.common.notebook import notebook_html
-from armlab.diagnosis.data import Observed
-from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.formats import Status
-from armlab.diagnosis.search import Step
-from armlab.diagnosis.simulation import Simulation
+from armlab.diagnosis.torque.evidence.evidence import Evidence
+from armlab.diagnosis.torque.rows.data import Observed
+from armlab.diagnosis.torque.rows.simulation import Simulation
+from armlab.diagnosis.torque.search.search import Step
 from armlab.effects.contract import UNKNOWN, Candidate
 from armlab.effects.parameters import ParameterValue
 from armlab.identification.torque_model import TorqueModel
@@ -133,7 +133,7 @@ class Claim:
     probability: of its name; members: of its class, the likeliest first, where the name alone is not probable enough.
     left_out: the part of its torque that the model found does not predict. simulated: its scalar parameters as the
     simulation has them, where it has a law of this kind there, to which the finding adds. removal: of it alone from the
-    model found. minor: of no practical size, or not among the findings that are told (`armlab.diagnosis.told`).
+    model found. minor: of no practical size, or not among the findings that are told (`armlab.report.told`).
     """
 
     effect: str
@@ -231,13 +231,14 @@ class Diagnosis:
     steps: the log of the search. looks: how many candidates and shapes were compared. signs: warnings about
     limits, names, clock and standstill of the recording as it is. setup: how it is to be read, None where that was not
     asked; `recording` is then as it should be read. weighed: the names of each finding, and of what was not probable
-    enough for one.
+    enough for one. reason: why no model was fitted, empty where one was. unnamed: the joint that is predicted much
+    better without any finding. summary: in words, empty where only the engine was asked.
     """
 
     recording: Recording
     simulation: Simulation
     status: Status
-    summary: str
+    reason: str = ""
     observed: Observed | None = None
     nominal: Array | None = None
     refit: Array | None = None
@@ -261,6 +262,8 @@ class Diagnosis:
     setup: Answer | None = None
     setup_seconds: float = 0.0
     weighed: tuple[Weighed, ...] = ()
+    unnamed: JointFit | None = None
+    summary: str = ""
     settings: dict[str, float | str | bool] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -272,7 +275,7 @@ class Diagnosis:
             lines.append(f"  {claim.effect}{place}: {claim.equation}")
         if len(self.claims) > 4:
             lines.append(f"  and {len(self.claims) - 4} more claims")
-        return "\n".join(lines if self.claims else [*lines, f"  {self.summary}"])
+        return "\n".join(lines if self.claims else [*lines, f"  {self.summary or self.reason}"])
 
     def _repr_html_(self) -> str:
         rows: list[tuple[object, ...]] = [
@@ -280,4 +283,4 @@ class Diagnosis:
         ]
         rows += [(each.effect, "" if each.joint is None else each.joint, each.equation) for each in self.claims]
         title = f"Diagnosis of {self.recording.name}: {self.status}"
-        return notebook_html(title, self.summary, ("effect", "joint", "equation"), rows)
+        return notebook_html(title, self.summary or self.reason, ("effect", "joint", "equation"), rows)

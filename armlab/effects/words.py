@@ -22,12 +22,17 @@ def place_in_words(arm: Arm, effect: str, joint: int | None, joints: Sequence[in
     return f"{joint_in_words(arm, joint)}{driver}"
 
 
+def at_place(arm: Arm, name: str, effect: str, joint: int | None, joints: Sequence[int] = ()) -> str:
+    """`friction at elbow`, `tilt of the whole robot`: a name of an effect with its place."""
+    return f"{name} {'of' if joint is None else 'at'} {place_in_words(arm, effect, joint, joints)}"
+
+
 def component_in_words(arm: Arm, part: Candidate, parameters: Sequence[ParameterValue]) -> str:
     """`joint elasticity at elbow (26420 N m/rad)`: a component of a model; several numbers have their names."""
-    where = place_in_words(arm, part.effect, part.joint, part.joints)
     numbers = []
     for each in parameters:
         name = each.name.replace("_", " ") if len(parameters) > 1 else ""
         values = map(format_number, np.ravel(each.value).tolist())
         numbers.append(" ".join(filter(None, [name, *values, format_unit(each.unit)])))
-    return f"{part.facts.words} {'of' if part.joint is None else 'at'} {where} ({', '.join(numbers)})"
+    named = at_place(arm, part.facts.words, part.effect, part.joint, part.joints)
+    return f"{named} ({', '.join(numbers)})"

@@ -10,8 +10,8 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema
 
 from armlab.diagnosis.formats import ComparisonFile, VerdictFile
-from armlab.diagnosis.real_folders.facts import FactsFile
 from armlab.identification.model_file import ModelFile
+from armlab.proof.open.real_folders.facts import FactsFile
 from armlab.recordings.recording_file import RecordingFile
 from problem.robot_file import RobotFile
 

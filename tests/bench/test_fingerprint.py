@@ -90,7 +90,7 @@ def test_a_comment_a_docstring_or_a_layout_changes_nothing(tree: Path, file: str
         ("problem/robots/emps.yaml", "name:", "comment:"),
         ("bench/tables.py", "import numpy as np", "import numpy as np\nFACTOR = 2"),
         ("bench/dispatch.py", "import os", "import os\nFACTOR = 2"),
-        ("armlab/diagnosis/search.py", "import numpy as np", "import numpy as np\nFACTOR = 2"),
+        ("armlab/diagnosis/torque/search/search.py", "import numpy as np", "import numpy as np\nFACTOR = 2"),
     ],
     ids=lambda value: value if "/" in value else "",
 )

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from armlab.common.statistics import adjust_by_holm, wilson_interval
 from armlab.common.streams import named_generator
-from armlab.concealed.plan import random_stream
+from armlab.proof.blind.plan import random_stream
 
 
 def test_holm_multiplies_the_smallest_p_value_most_and_keeps_the_order_along_the_last_axis() -> None:

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.recordings.recording import Recording
 
 _KNOWN: dict[str, Diagnosis] = {}
@@ -34,4 +34,4 @@ def diagnose_once(
 @pytest.fixture
 def each_diagnosed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests of comparisons, which begin with a diagnosis of every recording."""
-    monkeypatch.setattr("armlab.diagnosis.compare.comparison.diagnose", diagnose_once)
+    monkeypatch.setattr("armlab.diagnosis.changes.comparison.diagnose", diagnose_once)

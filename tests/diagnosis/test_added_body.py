@@ -9,12 +9,12 @@ import pytest
 from effect_scenes import scene_of
 from told_recordings import ARM, PAYLOAD, frame, motion_at, recording_in
 
-from armlab.diagnosis.added_body import _fewer_off, _likeliest_body, is_possible_body
-from armlab.diagnosis.diagnose import diagnose
-from armlab.diagnosis.evidence import Evidence
-from armlab.diagnosis.plausibility import _reason_other_mass, reason_link_unknown
 from armlab.diagnosis.result import Claim
-from armlab.diagnosis.surrogate import Structure
+from armlab.diagnosis.torque.diagnose import diagnose
+from armlab.diagnosis.torque.evidence.added_body import _fewer_off, _likeliest_body, is_possible_body
+from armlab.diagnosis.torque.evidence.evidence import Evidence
+from armlab.diagnosis.torque.evidence.plausibility import _reason_other_mass, reason_link_unknown
+from armlab.diagnosis.torque.search.surrogate import Structure
 from armlab.diagnosis.tuning import PlausibilityTuning
 from armlab.effects.links import BODY_SIZE_M, SolidBody
 from armlab.effects.parameters import ParameterValue
@@ -146,7 +146,7 @@ def test_structure_beyond_a_link_may_be_of_a_body_that_a_later_link_carries() ->
 def test_a_load_that_weighs_otherwise_when_found_anew_is_not_told(
     anew: float | None, told: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("armlab.diagnosis.plausibility.mass_found_anew", lambda model, link: anew)
+    monkeypatch.setattr("armlab.diagnosis.torque.evidence.plausibility.mass_found_anew", lambda model, link: anew)
     evidence = Evidence(1, 0.0, 0.0, 0.9, 0.0, 0.9, 9.0, 1.0, 500.0)
     mass = ParameterValue("mass", 2.0, (1.9, 2.1), "kg")
     body = SolidBody.of_body(ARM, 3, BODY)

@@ -7,16 +7,23 @@ import numpy as np
 import pytest
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.design import DesignMatrix
-from armlab.diagnosis.diagnose import NamedEffects, _with_probable, prepare
-from armlab.diagnosis.evidence import Judge
-from armlab.diagnosis.fitted_model import FittedModel, fit_background
-from armlab.diagnosis.naming.additions import Additions, Found, _acting_where, _added, _named, with_likeliest_names
-from armlab.diagnosis.naming.choice import Weights
-from armlab.diagnosis.naming.weighing import weigh_effect
-from armlab.diagnosis.search import Search
 from armlab.diagnosis.settings import Settings, vary
-from armlab.diagnosis.solver import State
+from armlab.diagnosis.torque.columns.design import DesignMatrix
+from armlab.diagnosis.torque.columns.solver import State
+from armlab.diagnosis.torque.diagnose import NamedEffects, _with_probable, prepare
+from armlab.diagnosis.torque.evidence.evidence import Judge
+from armlab.diagnosis.torque.names.additions import (
+    Additions,
+    Found,
+    _acting_where,
+    _added,
+    _named,
+    with_likeliest_names,
+)
+from armlab.diagnosis.torque.names.choice import Weights
+from armlab.diagnosis.torque.names.weighing import weigh_effect
+from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_background
+from armlab.diagnosis.torque.search.search import Search
 from armlab.effects.library import library
 from problem.motion import Motion
 
@@ -49,7 +56,7 @@ def found_as(model: FittedModel, effect: str) -> Found:
 def test_what_is_added_has_the_likeliest_name(model: FittedModel, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever raised the score: here weights that ask for nothing but the name."""
     monkeypatch.setattr(
-        "armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: Weights({"is cable_stiffness": 9.0})
+        "armlab.diagnosis.torque.names.decide.calibrated_weights", lambda left_out: Weights({"is cable_stiffness": 9.0})
     )
     spring_found = found_as(model, "cable_stiffness")
     for first in (found_as(model, "gravity_compensator"), spring_found):
@@ -60,7 +67,7 @@ def test_what_is_added_has_the_likeliest_name(model: FittedModel, monkeypatch: p
 
 def test_none_of_the_names_changes_nothing(model: FittedModel, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: Weights({"left none": 9.0})
+        "armlab.diagnosis.torque.names.decide.calibrated_weights", lambda left_out: Weights({"left none": 9.0})
     )
     first = found_as(model, "gravity_compensator")
     assert _named(model, first, ())[0] is first
@@ -74,7 +81,7 @@ def holding(model: FittedModel, effect: str) -> FittedModel:
 @pytest.mark.parametrize("effect", ["gravity_compensator", "cable_stiffness"])
 def test_what_passed_takes_its_likeliest_name(model: FittedModel, monkeypatch: pytest.MonkeyPatch, effect: str) -> None:
     monkeypatch.setattr(
-        "armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: Weights({"is cable_stiffness": 9.0})
+        "armlab.diagnosis.torque.names.decide.calibrated_weights", lambda left_out: Weights({"is cable_stiffness": 9.0})
     )
     held = holding(model, effect)
     named, effects = with_likeliest_names(held, Judge(held, held.state).effects(), ())
@@ -88,10 +95,10 @@ def test_what_passed_keeps_its_name_where_the_numbers_of_a_likelier_one_cannot_b
     model: FittedModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: Weights({"is cable_stiffness": 9.0})
+        "armlab.diagnosis.torque.names.decide.calibrated_weights", lambda left_out: Weights({"is cable_stiffness": 9.0})
     )
     monkeypatch.setattr(
-        "armlab.diagnosis.naming.additions.doubtful_names",
+        "armlab.diagnosis.torque.names.additions.doubtful_names",
         lambda model, effects, exact: dict.fromkeys(effects, "stiffness may be zero"),
     )
     held = holding(model, "gravity_compensator")
@@ -104,7 +111,8 @@ def test_what_passed_keeps_its_name_where_none_is_likelier(model: FittedModel, m
     known = Judge(held, held.state).effects()
     for weights in ({"is cable_stiffness": 8.5, "is gravity_compensator": 9.0}, {"found none": 9.0}):
         monkeypatch.setattr(
-            "armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out, weights=weights: Weights(weights)
+            "armlab.diagnosis.torque.names.decide.calibrated_weights",
+            lambda left_out, weights=weights: Weights(weights),
         )
         assert with_likeliest_names(held, known, ()) == (held, known)
 
@@ -120,8 +128,8 @@ def test_what_is_added_in_the_place_of_an_effect_leaves_no_trace_of_it(
     evidence = Judge(held, held.state).effects()[old]
     found = found_as(model, "cable_stiffness")
     added = Additions(replace(held, state=found[1]), {found[0]: found[2]}, {})
-    monkeypatch.setattr("armlab.diagnosis.diagnose.add_probable", lambda model, left: added)
-    monkeypatch.setattr("armlab.diagnosis.diagnose.with_likeliest_names", lambda *given: given[:2])
+    monkeypatch.setattr("armlab.diagnosis.torque.diagnose.add_probable", lambda model, left: added)
+    monkeypatch.setattr("armlab.diagnosis.torque.diagnose.with_likeliest_names", lambda *given: given[:2])
     named, _ = _with_probable(NamedEffects(held, {old: evidence}, {}, ()))
     assert set(named.effects) == {found[0]} == set(named.model.state.groups)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from armlab.diagnosis.report.arm_picture import JointMark, draw_arm
+from armlab.report.torque.arm_picture import JointMark, draw_arm
 from problem.robot_file import load_arm
 
 

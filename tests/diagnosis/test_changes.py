@@ -23,24 +23,24 @@ from told_recordings import ARM, VISCOUS, frame, motion_at, recording_in
 
 from armlab.cli.main import main
 from armlab.common.statistics import adjust_by_holm
-from armlab.diagnosis.compare import soundness
-from armlab.diagnosis.compare.comparison import Comparison, compare, look_plainly
-from armlab.diagnosis.compare.friction_level import ALL_FRICTION
-from armlab.diagnosis.compare.numbers import Change, laws_of
-from armlab.diagnosis.compare.pooled import pool_plainly, unite_candidates
-from armlab.diagnosis.compare.report import comparison_lines, comparison_sentences, make_comparison_file
-from armlab.diagnosis.found_model import model_found
-from armlab.diagnosis.relations.variants import one_run
+from armlab.diagnosis.changes import soundness
+from armlab.diagnosis.changes.comparison import Comparison, compare, look_plainly
+from armlab.diagnosis.changes.friction_level import ALL_FRICTION
+from armlab.diagnosis.changes.numbers import Change, laws_of
+from armlab.diagnosis.changes.pooled import pool_plainly, unite_candidates
 from armlab.diagnosis.settings import Settings
-from armlab.diagnosis.simulation import read_simulation
+from armlab.diagnosis.torque.predict.found_model import model_found
+from armlab.diagnosis.torque.rows.simulation import read_simulation
 from armlab.diagnosis.tuning import ComparisonTuning
 from armlab.effects.contract import Scene
 from armlab.effects.drive import TorqueGain, TorqueGainBySign
 from armlab.effects.friction import CoulombFriction, LevelsAndSlopes, Slopes, ViscousFriction
+from armlab.proof.open.relations.variants import one_run
 from armlab.recordings.load import load_recording
 from armlab.recordings.plain_least_squares import compare_plain
 from armlab.recordings.public import fetch_recording
 from armlab.recordings.recording import Recording
+from armlab.report.changes.report import comparison_lines, comparison_sentences, make_comparison_file
 from problem.regressor import rigid_body_torque
 
 pytestmark = pytest.mark.usefixtures("each_diagnosed_once")

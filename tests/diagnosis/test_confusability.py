@@ -13,9 +13,15 @@ from refusals import refusal
 from told_recordings import ARM, frame, motion_at, recording_in
 
 from armlab.cli.main import main
-from armlab.diagnosis.confusability.card import Card, Entry, PlannedMotion, confusability_card, read_planned_motions
-from armlab.diagnosis.confusability.report import card_content, card_csv, card_lines, card_markdown
+from armlab.diagnosis.next.confusability.card import (
+    Card,
+    Entry,
+    PlannedMotion,
+    confusability_card,
+    read_planned_motions,
+)
 from armlab.effects.library import library
+from armlab.report.confusability.report import card_content, card_csv, card_lines, card_markdown
 
 RECORDS = Path(__file__).parents[2] / "results" / "best_known.json"
 

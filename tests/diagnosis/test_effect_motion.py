@@ -10,8 +10,8 @@ from random_arms import random_arm
 from scipy.interpolate import make_interp_spline
 
 from armlab.common.arrays import Array
-from armlab.concealed.effects.channels import EncoderOffset as HiddenOffset
 from armlab.effects.contract import Scene
+from armlab.proof.blind.effects.channels import EncoderOffset as HiddenOffset
 from problem.arm import Arm
 from problem.motion import Motion
 

@@ -12,10 +12,11 @@ import yaml
 from shipped_schemas import check_against_schema
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.result import Diagnosis
-from armlab.diagnosis.verdict_files import make_verdict, write_verdict
+from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.identification.identifier import Identifier
+from armlab.report.told.summary import summary_of
+from armlab.report.verdict_files import make_verdict, write_verdict
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 from problem.robot_file import load_arm
@@ -181,7 +182,7 @@ def test_torque_of_the_wrong_sign_is_read_rightly_and_its_friction_found() -> No
     good = cases.recording(friction_everywhere)
     turned = replace(good, runs=tuple(run.with_signals(run.time, {"torque": -run.torque}) for run in good.runs))
     found = diagnose(turned)
-    assert found.summary.startswith("The recording is read wrongly: the torque of all joints has the other sign.")
+    assert summary_of(found).startswith("The recording is read wrongly: the torque of all joints has the other sign.")
     assert {each.joint for each in found.claims if each.effect == "viscous_friction"} == {1, 2, 3}
 
 
@@ -189,7 +190,7 @@ def test_torque_in_another_unit_is_read_rightly_and_the_factor_told() -> None:
     good = cases.recording(friction_everywhere)
     scaled = replace(good, runs=tuple(run.with_signals(run.time, {"torque": 1000 * run.torque}) for run in good.runs))
     found = diagnose(scaled)
-    assert "the torque of all joints is 1000 times the true one: another unit" in found.summary
+    assert "the torque of all joints is 1000 times the true one: another unit" in summary_of(found)
     assert {each.joint for each in found.claims if each.effect == "viscous_friction"} == {1, 2, 3}
 
 

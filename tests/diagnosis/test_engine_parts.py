@@ -8,19 +8,26 @@ import pytest
 from scipy.signal import lfilter
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.blocks import WhitenedRows, block_covariance, held_out_gain, variance_inflation
-from armlab.diagnosis.data import Observed, Segment, observe, split_segment
-from armlab.diagnosis.design import DesignMatrix, build_design_matrix
-from armlab.diagnosis.features import Features, Load, flexible_features, load_banks, motion_banks, whole_runs
-from armlab.diagnosis.fitted_model import FittedModel, fit_background
-from armlab.diagnosis.links import link_prior
-from armlab.diagnosis.noise import Noise, error_colours, fit_noise
 from armlab.diagnosis.settings import Settings
-from armlab.diagnosis.simulation import read_simulation
-from armlab.diagnosis.solver import Solver, State
-from armlab.diagnosis.surrogate import Remainder, Structure, find_structure
+from armlab.diagnosis.torque.columns.blocks import WhitenedRows, block_covariance, held_out_gain, variance_inflation
+from armlab.diagnosis.torque.columns.design import DesignMatrix, build_design_matrix
+from armlab.diagnosis.torque.columns.links import link_prior
+from armlab.diagnosis.torque.columns.solver import Solver, State
+from armlab.diagnosis.torque.evidence.unknown import FitOfAll, is_structured, predict_residual_structure
+from armlab.diagnosis.torque.rows.data import Observed, Segment, observe, split_segment
+from armlab.diagnosis.torque.rows.features import (
+    Features,
+    Load,
+    flexible_features,
+    load_banks,
+    motion_banks,
+    whole_runs,
+)
+from armlab.diagnosis.torque.rows.noise import Noise, error_colours, fit_noise
+from armlab.diagnosis.torque.rows.simulation import read_simulation
+from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_background
+from armlab.diagnosis.torque.search.surrogate import Remainder, Structure, find_structure
 from armlab.diagnosis.tuning import Tuning
-from armlab.diagnosis.unknown import FitOfAll, is_structured, predict_residual_structure
 from armlab.effects.library import library
 from armlab.effects.memory import dahl_state
 from armlab.recordings.recording import ROLES

@@ -6,10 +6,10 @@ import pytest
 import yaml
 from told_recordings import POSSIBLE_PAYLOAD, frame, recording_in
 
-from armlab.diagnosis.diagnose import diagnose
-from armlab.diagnosis.report.write import diagnose_recording
+from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.identification.model_file import read_model
 from armlab.recordings.load import load_recording
+from armlab.report.torque.write import diagnose_recording
 
 
 @pytest.mark.parametrize("sampled", [False, True])
@@ -22,7 +22,7 @@ def test_nothing_is_missing_of_the_model_that_a_diagnosis_found(tmp_path: Path, 
     content = yaml.safe_load((folder / "recording.yaml").read_text())
     (folder / "recording.yaml").write_text(yaml.safe_dump(content | {"simulation": "../out/model.yaml"}))
     again = diagnose(load_recording(folder))
-    assert again.status == "none", again.summary
+    assert again.status == "none", again.claims
 
 
 def _with_upright_base(path: Path) -> None:

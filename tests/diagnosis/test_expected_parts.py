@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.diagnose import prepare
-from armlab.diagnosis.expected_parts import claim_expected_parts
-from armlab.diagnosis.fitted_model import FittedModel, fit_background
-from armlab.diagnosis.prediction import fit_prediction
 from armlab.diagnosis.settings import Settings
-from armlab.diagnosis.solver import State
+from armlab.diagnosis.torque.columns.solver import State
+from armlab.diagnosis.torque.diagnose import prepare
+from armlab.diagnosis.torque.names.expected_parts import claim_expected_parts
+from armlab.diagnosis.torque.predict.prediction import fit_prediction
+from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_background
 from armlab.effects.library import library
 from problem.motion import Motion
 

@@ -8,12 +8,12 @@ from click.testing import CliRunner
 
 from armlab.cli.main import main
 from armlab.common.errors import InputError
-from armlab.diagnosis import ablation
-from armlab.diagnosis.ablation import ALL_ON, GUARDS_AFTER_SEARCH, GUARDS_IN_SEARCH, diagnose_without_each
-from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import GUARDS, Guards, Settings, guards_without, vary
+from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.diagnosis.tuning import parse_change
+from armlab.proof.open import ablation
+from armlab.proof.open.ablation import ALL_ON, GUARDS_AFTER_SEARCH, GUARDS_IN_SEARCH, diagnose_without_each
 
 
 def test_a_guard_that_is_named_is_off_and_all_others_are_on() -> None:

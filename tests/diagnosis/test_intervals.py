@@ -4,12 +4,12 @@ import engine_cases as cases
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.design import DesignMatrix
-from armlab.diagnosis.diagnose import prepare
-from armlab.diagnosis.fitted_model import FittedModel, fit_background
-from armlab.diagnosis.intervals import extend_with_shapes
 from armlab.diagnosis.settings import Settings
-from armlab.diagnosis.solver import State
+from armlab.diagnosis.torque.columns.design import DesignMatrix
+from armlab.diagnosis.torque.columns.solver import State
+from armlab.diagnosis.torque.diagnose import prepare
+from armlab.diagnosis.torque.names.intervals import extend_with_shapes
+from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_background
 from armlab.effects.library import library
 from problem.motion import Motion
 

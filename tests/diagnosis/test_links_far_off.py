@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from example_log import record_example
 
-from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.recordings.load import load_recording
 from problem.arm import Arm
 from problem.pseudo_inertia import link_from_centre_of_mass

@@ -11,10 +11,10 @@ from public_copies import needs_copies
 from refusals import refusal
 
 from armlab.common.documents import Document
-from armlab.diagnosis.design import DesignMatrix
-from armlab.diagnosis.diagnose import NamedEffects, diagnose, find_names
-from armlab.diagnosis.fitted_model import Progress
-from armlab.diagnosis.load import nominal_payload_lines
+from armlab.diagnosis.torque.carried_load import nominal_payload_lines
+from armlab.diagnosis.torque.columns.design import DesignMatrix
+from armlab.diagnosis.torque.diagnose import NamedEffects, diagnose, find_names
+from armlab.diagnosis.torque.search.fitted_model import Progress
 from armlab.identification.payload import PayloadSetting, Place
 from armlab.recordings.load import load_recording
 from armlab.recordings.public import fetch_recording

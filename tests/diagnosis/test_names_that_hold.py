@@ -8,12 +8,12 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.diagnose import diagnose
-from armlab.diagnosis.evidence import Evidence
-from armlab.diagnosis.pushes import Stretch, reason_no_contact
-from armlab.diagnosis.surrogate import Structure
+from armlab.diagnosis.torque.diagnose import diagnose
+from armlab.diagnosis.torque.evidence.evidence import Evidence
+from armlab.diagnosis.torque.evidence.pushes import Stretch, reason_no_contact
+from armlab.diagnosis.torque.evidence.unknown import is_form_error, names_contradicted_by_residual
+from armlab.diagnosis.torque.search.surrogate import Structure
 from armlab.diagnosis.tuning import Tuning
-from armlab.diagnosis.unknown import is_form_error, names_contradicted_by_residual
 
 TUNING = Tuning()
 
@@ -45,7 +45,7 @@ def test_a_name_that_does_not_hold_is_withdrawn_once(monkeypatch: pytest.MonkeyP
         assert len(asked) < 10
         return asked[-1]
 
-    monkeypatch.setattr("armlab.diagnosis.diagnose.names_contradicted_by_residual", same_again)
+    monkeypatch.setattr("armlab.diagnosis.torque.diagnose.names_contradicted_by_residual", same_again)
     diagnose(cases.recording(lambda motion, time: 0.05 * motion.velocity**3, seconds=6.0))
     assert asked[0]
 

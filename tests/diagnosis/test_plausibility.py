@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.plausibility import reason_implausible
+from armlab.diagnosis.torque.evidence.plausibility import reason_implausible
 from armlab.diagnosis.tuning import PlausibilityTuning
 from armlab.effects.contract import Candidate
 from armlab.effects.friction import ViscousFriction

@@ -9,12 +9,12 @@ import pytest
 from told_recordings import frame, recording_in
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.diagnose import diagnose, prepare
-from armlab.diagnosis.fitted_model import FittedModel, fit_background, fit_coloured_noise, whitening_losses
 from armlab.diagnosis.formats import VerdictFile
-from armlab.diagnosis.found_model import model_found, named_model
-from armlab.diagnosis.noise import Noise, choose_noise
-from armlab.diagnosis.prediction import (
+from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.settings import Baseline, Guards, Settings
+from armlab.diagnosis.torque.diagnose import diagnose, prepare
+from armlab.diagnosis.torque.predict.found_model import model_found, named_model
+from armlab.diagnosis.torque.predict.prediction import (
     _may_help,
     choose_smoothing,
     filtered_residual,
@@ -22,13 +22,18 @@ from armlab.diagnosis.prediction import (
     identification_runs,
     recorded_residual,
 )
-from armlab.diagnosis.result import Diagnosis
-from armlab.diagnosis.settings import Baseline, Guards, Settings
-from armlab.diagnosis.verdict_files import make_verdict
+from armlab.diagnosis.torque.rows.noise import Noise, choose_noise
+from armlab.diagnosis.torque.search.fitted_model import (
+    FittedModel,
+    fit_background,
+    fit_coloured_noise,
+    whitening_losses,
+)
 from armlab.effects.friction import PowerFriction
 from armlab.effects.library import library
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
+from armlab.report.verdict_files import make_verdict
 from problem.motion import Motion
 
 

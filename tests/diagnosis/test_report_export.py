@@ -9,11 +9,11 @@ from numpy.testing import assert_allclose
 from told_recordings import TORQUE, frame, motion_at, recording_in
 
 from armlab.common.errors import InputError
-from armlab.diagnosis.diagnose import diagnose
-from armlab.diagnosis.verdict_files import write_verdict
+from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.identification.model_file import read_model
 from armlab.identification.write_simulator import export_model
 from armlab.recordings.load import load_recording
+from armlab.report.verdict_files import write_verdict
 from problem.motion import Motion
 from problem.robot_file import load_arm
 

@@ -26,24 +26,24 @@ from armlab.common.report.charts import (
     MEASURED_LOOK,
     REFITTED_LOOK,
 )
-from armlab.diagnosis.diagnose import diagnose
-from armlab.diagnosis.report import write
-from armlab.diagnosis.report.content import error_note, finding_details, left_table
-from armlab.diagnosis.report.gallery import draw_gallery
-from armlab.diagnosis.report.measured import body_sentences, joint_table
-from armlab.diagnosis.report.residuals import correlation_seconds, filter_correlation_seconds, select_residuals
-from armlab.diagnosis.report.torque_pictures import evidence_variable
-from armlab.diagnosis.report.verdict import first_screen, verdict_lines
-from armlab.diagnosis.report.words import effect_in_words, format_gap, format_measured, format_share, shorten_name
-from armlab.diagnosis.report.write import report_texts, write_report
 from armlab.diagnosis.result import Diagnosis, Member, Part, Rival, Unexplained
-from armlab.diagnosis.told.told import tell
-from armlab.diagnosis.verdict_files import verdict_texts
+from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.effects.contract import Effect
 from armlab.effects.friction import CoulombFriction
 from armlab.effects.parameters import ParameterValue
 from armlab.effects.timing import TimeDelay
 from armlab.recordings.load import load_recording
+from armlab.report.told.told import tell
+from armlab.report.torque import write
+from armlab.report.torque.content import error_note, finding_details, left_table
+from armlab.report.torque.gallery import draw_gallery
+from armlab.report.torque.measured import body_sentences, joint_table
+from armlab.report.torque.residuals import correlation_seconds, filter_correlation_seconds, select_residuals
+from armlab.report.torque.torque_pictures import evidence_variable
+from armlab.report.torque.verdict import first_screen, verdict_lines
+from armlab.report.torque.write import report_texts, write_report
+from armlab.report.verdict_files import verdict_texts
+from armlab.report.words import effect_in_words, format_gap, format_measured, format_share, shorten_name
 from problem.robot_file import load_arm
 
 HOSTILE = "x<script>alert(1)<!script>\"&'<img src=y onerror=alert(2)>"

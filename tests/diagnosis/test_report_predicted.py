@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 from told_recordings import frame, recording_in
 
-from armlab.diagnosis.diagnose import diagnose
-from armlab.diagnosis.verdict_files import predicted_texts
+from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.recordings.load import load_recording
+from armlab.report.verdict_files import predicted_texts
 
 
 def test_the_prediction_of_a_held_out_run_is_as_far_from_the_measurement_as_the_verdict_says(tmp_path: Path) -> None:

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from told_recordings import ARM, frame, recording_in
 
-from armlab.diagnosis.diagnose import diagnose
-from armlab.diagnosis.resimulate import WINDOW_SECONDS, Body, NoInertiaError, resimulate, runge_kutta
+from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.recordings.load import load_recording
+from armlab.report.resimulate import WINDOW_SECONDS, Body, NoInertiaError, resimulate, runge_kutta
 from problem.arm import Arm, Joint, Link
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque

@@ -8,11 +8,17 @@ import numpy as np
 import pytest
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.design import DesignMatrix
-from armlab.diagnosis.diagnose import prepare
-from armlab.diagnosis.fitted_model import FittedModel, fit_background, search_effects, torque_of, with_design
-from armlab.diagnosis.pruning import Pruned, prune, scan_what_is_left
 from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.torque.columns.design import DesignMatrix
+from armlab.diagnosis.torque.diagnose import prepare
+from armlab.diagnosis.torque.evidence.pruning import Pruned, prune, scan_what_is_left
+from armlab.diagnosis.torque.search.fitted_model import (
+    FittedModel,
+    fit_background,
+    search_effects,
+    torque_of,
+    with_design,
+)
 from armlab.effects.contract import Family
 from armlab.effects.library import library
 from problem.motion import Motion

@@ -5,13 +5,13 @@ from typing import Any
 
 import pytest
 
-from armlab.diagnosis.report.sentences import finding_sentence
-from armlab.diagnosis.report.words import finding_in_words, variables_in_words
 from armlab.diagnosis.result import Claim, Rival
-from armlab.diagnosis.simulation import Simulation
+from armlab.diagnosis.torque.rows.simulation import Simulation
 from armlab.effects.contract import ANGLE, Effect, Parameter
 from armlab.effects.library import EFFECT_IDS, effect_named
 from armlab.effects.parameters import ParameterValue
+from armlab.report.torque.sentences import finding_sentence
+from armlab.report.words import finding_in_words, variables_in_words
 from problem.presets import load_arm
 
 ARM = load_arm("irb120-arm")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from told_recordings import ARM, POSITION, frame, recording_in
 
-from armlab.concealed.setup.mistakes import Injected, inject
-from armlab.diagnosis.diagnose import diagnose
-from armlab.diagnosis.report.verdict import verdict_sentences
+from armlab.diagnosis.torque.diagnose import diagnose
+from armlab.proof.blind.setup.mistakes import Injected, inject
 from armlab.recordings.load import load_recording
+from armlab.report.torque.verdict import verdict_sentences
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 
@@ -53,10 +53,10 @@ def test_a_reading_that_cannot_be_asked_is_not_called_right(
     run[still] = 0.0
     found = diagnose(load_recording(recording_in(tmp_path / "rig", run, validate=False)), only_setup=True)
     assert found.status == "inconclusive"
-    assert why in found.summary
+    assert why in found.reason
 
 
 def test_a_reading_that_is_right_is_called_right(tmp_path: Path) -> None:
     found = diagnose(load_recording(recording_in(tmp_path / "rig", frame(0, 8), validate=False)), only_setup=True)
-    assert (found.status, found.summary) == ("none", "Nothing is wrong with the reading; physics was not asked.")
-    assert verdict_sentences(found) == (found.summary, "")
+    assert (found.status, found.reason) == ("none", "Nothing is wrong with the reading; physics was not asked.")
+    assert verdict_sentences(found) == (found.reason, "")

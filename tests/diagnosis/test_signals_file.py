@@ -16,13 +16,13 @@ from told_recordings import frame, recording_in
 
 from armlab.cli.main import main
 from armlab.common.arrays import Array
-from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.formats import read_verdict_file
 from armlab.diagnosis.result import Diagnosis
-from armlab.diagnosis.signals_file import diagnosis_tracks, signals_content, topic_names
+from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.recordings.load import load_recording
 from armlab.recordings.motion import load_motion_recording
 from armlab.recordings.recording import MotionRun
+from armlab.report.signals_file import diagnosis_tracks, signals_content, topic_names
 
 Topics = dict[str, dict[str, Array]]
 

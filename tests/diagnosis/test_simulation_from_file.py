@@ -9,17 +9,17 @@ import pandas as pd
 import pytest
 import yaml
 
-from armlab.diagnosis.diagnose import diagnose
-from armlab.diagnosis.report.content import parameter_table
-from armlab.diagnosis.report.verdict import verdict_lines
 from armlab.diagnosis.result import Diagnosis
-from armlab.diagnosis.simulation import Simulation
-from armlab.diagnosis.verdict_files import make_verdict
+from armlab.diagnosis.torque.diagnose import diagnose
+from armlab.diagnosis.torque.rows.simulation import Simulation
 from armlab.effects.friction import CoulombFriction, LevelsAndSlopes, PowerFriction, StribeckFriction, ViscousFriction
 from armlab.effects.term import Term
 from armlab.identification.model_file import model_content
 from armlab.identification.nominal import nominal_model
 from armlab.recordings.load import load_recording
+from armlab.report.torque.content import parameter_table
+from armlab.report.torque.verdict import verdict_lines
+from armlab.report.verdict_files import make_verdict
 from problem.drive_torque import drive_torque
 from problem.motion import Motion
 from problem.robot_file import load_arm

@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armlab.diagnosis.parts import add_in_order, cause_of, stack_in_units
 from armlab.diagnosis.result import Claim, Member, Part, Removal
-from armlab.diagnosis.told.findings import (
+from armlab.diagnosis.torque.names.findings import (
     Statement,
     causes_of,
     finding_shares,
@@ -18,6 +17,7 @@ from armlab.diagnosis.told.findings import (
     with_minor_ones,
     without_lesser_unknowns,
 )
+from armlab.diagnosis.torque.predict.parts import add_in_order, cause_of, stack_in_units
 from armlab.effects.contract import UNKNOWN, Effect
 from armlab.effects.library import effect_named
 

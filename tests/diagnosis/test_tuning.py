@@ -11,10 +11,10 @@ from told_recordings import frame, recording_in
 
 from armlab.cli.main import main
 from armlab.common.errors import InputError
-from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.settings import Settings, vary
+from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.diagnosis.tuning import Tuning, changed_numbers, parse_change, tuning_numbers, tuning_page
-from armlab.diagnosis.verdict_files import verdict_texts
+from armlab.report.verdict_files import verdict_texts
 
 ROOT = Path(__file__).parents[2]
 

@@ -6,11 +6,17 @@ import engine_cases as cases
 import numpy as np
 import pytest
 
-from armlab.diagnosis.data import in_fixed_order, observe
-from armlab.diagnosis.prediction import filtered_residual, identification_runs
 from armlab.diagnosis.settings import Settings
-from armlab.diagnosis.simulation import read_simulation
-from armlab.diagnosis.yardstick import Yardstick, fit_yardstick, predicts_better, squared_errors, with_claims
+from armlab.diagnosis.torque.predict.prediction import filtered_residual, identification_runs
+from armlab.diagnosis.torque.predict.yardstick import (
+    Yardstick,
+    fit_yardstick,
+    predicts_better,
+    squared_errors,
+    with_claims,
+)
+from armlab.diagnosis.torque.rows.data import in_fixed_order, observe
+from armlab.diagnosis.torque.rows.simulation import read_simulation
 from armlab.recordings.recording import Recording
 
 

@@ -7,7 +7,7 @@ import pytest
 from public_copies import needs_copies
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.effects.scene import scene_of
 from armlab.effects.transmission import FrictionBehindPlay
 from armlab.recordings.load import load_recording

@@ -16,17 +16,17 @@ import pytest
 import yaml
 from numpy.testing import assert_allclose
 
-from armlab.diagnosis.claims import next_experiment
 from armlab.diagnosis.next.question import Name
 from armlab.diagnosis.next.verdict_file import read_verdict, select_rival_groups
-from armlab.diagnosis.report.write import diagnose_recording
 from armlab.diagnosis.result import Rival
+from armlab.diagnosis.torque.names.claims import next_experiment
 from armlab.effects.library import effect_named, library
 from armlab.identification.identifier import Identifier
 from armlab.identification.model_file import read_model
 from armlab.identification.structure import Structure
 from armlab.identification.write_simulator import export_model
 from armlab.recordings.load import load_recording
+from armlab.report.torque.write import diagnose_recording
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 from problem.robot_file import load_arm

@@ -9,21 +9,21 @@ from refusals import refusal
 from scipy.stats import spearmanr
 from simulated_arm import arm, run, structure, truth
 
-import armlab.identification.conditioning.arm as conditioning_arm
-import armlab.identification.conditioning.correlation as correlation
-import armlab.identification.conditioning.study as study
+import armlab.proof.open.conditioning.arm as conditioning_arm
+import armlab.proof.open.conditioning.correlation as correlation
+import armlab.proof.open.conditioning.study as study
 from armlab.common.arrays import Array
-from armlab.identification.conditioning.answer import MEAN, median_of_preferred, verdict
-from armlab.identification.conditioning.arm import ArmWindows, simulated_torques, study_arm
-from armlab.identification.conditioning.correlation import BlockCorrelation, average, correlate
-from armlab.identification.conditioning.criteria import CRITERIA, prediction_criterion, window_criteria
-from armlab.identification.conditioning.page import CHOICES_NAME, PAGE_NAME, TABLE_NAME
-from armlab.identification.conditioning.windows import Windows, block_rows
 from armlab.identification.identifier import Identifier
-from armlab.identification.real.study import Recipe
 from armlab.identification.regression import Regression
 from armlab.identification.torque_model import TorqueModel
 from armlab.identification.validation import run_error
+from armlab.proof.open.conditioning.answer import MEAN, median_of_preferred, verdict
+from armlab.proof.open.conditioning.arm import ArmWindows, simulated_torques, study_arm
+from armlab.proof.open.conditioning.correlation import BlockCorrelation, average, correlate
+from armlab.proof.open.conditioning.criteria import CRITERIA, prediction_criterion, window_criteria
+from armlab.proof.open.conditioning.page import CHOICES_NAME, PAGE_NAME, TABLE_NAME
+from armlab.proof.open.conditioning.windows import Windows, block_rows
+from armlab.proof.open.real_identification.study import Recipe
 from armlab.recordings.recording import Recording, Transmission
 
 RECIPE = Recipe("emps", {})
@@ -45,7 +45,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(correlation, "PERMUTATIONS", 99)
     monkeypatch.setattr(conditioning_arm, "WINDOW_BLOCKS", (10, 11))
     for module in ("answer", "page", "figure"):
-        monkeypatch.setattr(f"armlab.identification.conditioning.{module}.WINDOW_BLOCKS", (10, 11))
+        monkeypatch.setattr(f"armlab.proof.open.conditioning.{module}.WINDOW_BLOCKS", (10, 11))
 
 
 def test_windows_are_all_choices_of_blocks_and_a_permutation_exchanges_them() -> None:

@@ -13,12 +13,10 @@ from armlab.common.arrays import Array
 from armlab.effects.friction import ViscousFriction
 from armlab.identification.components import every_joint
 from armlab.identification.covariance import uncertainty
-from armlab.identification.coverage import Noise, three_joint_experiment
 from armlab.identification.cross_validation import folds, regression_moments
 from armlab.identification.estimators.least_squares import OrdinaryLeastSquares
 from armlab.identification.payload import identify_payload, torque_gains
 from armlab.identification.priors import Pull, point_mass
-from armlab.identification.real.looks import Looks
 from armlab.identification.regression import Regression, regression, signals_of
 from armlab.identification.selection import (
     USUAL_GROUPS,
@@ -28,6 +26,8 @@ from armlab.identification.selection import (
     toggle_group,
 )
 from armlab.identification.structure import Structure
+from armlab.proof.open.coverage import Noise, three_joint_experiment
+from armlab.proof.open.real_identification.looks import Looks
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.recording import Run
 from problem.pseudo_inertia import link_of

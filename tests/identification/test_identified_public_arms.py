@@ -6,10 +6,10 @@ from public_copies import needs_copies
 
 from armlab.identification.components import usual_components, wrist_couplings
 from armlab.identification.model import Model
-from armlab.identification.real.published import Comparison, sum_weights
-from armlab.identification.real.study import RECIPES, recipe_named, study_recording
 from armlab.identification.structure import Structure
 from armlab.identification.validation import run_error
+from armlab.proof.open.real_identification.published import Comparison, sum_weights
+from armlab.proof.open.real_identification.study import RECIPES, recipe_named, study_recording
 from armlab.recordings.public import PUBLIC_RECORDINGS, open_public_recording
 from problem.robot_file import load_arm
 

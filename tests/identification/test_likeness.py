@@ -9,12 +9,12 @@ import pytest
 import yaml
 
 from armlab.common.errors import DataError
-from armlab.identification.likeness.classifier import LikenessArm, area_under_curve, separate
-from armlab.identification.likeness.features import FEATURES, recording_features
-from armlab.identification.likeness.page import FIGURE_FILE, PAGE_FILE, likeness_texts
-from armlab.identification.likeness.pictures import KEY_FILE, Pictured, draw_pictures
-from armlab.identification.likeness.real_arms import RealFolder, arm_of, drawable_folders
-from armlab.identification.likeness.study import compare, look_of, looks_text, read_looks
+from armlab.proof.open.likeness.classifier import LikenessArm, area_under_curve, separate
+from armlab.proof.open.likeness.features import FEATURES, recording_features
+from armlab.proof.open.likeness.page import FIGURE_FILE, PAGE_FILE, likeness_texts
+from armlab.proof.open.likeness.pictures import KEY_FILE, Pictured, draw_pictures
+from armlab.proof.open.likeness.real_arms import RealFolder, arm_of, drawable_folders
+from armlab.proof.open.likeness.study import compare, look_of, looks_text, read_looks
 
 ROBOT = {
     "name": "drive",
@@ -84,7 +84,7 @@ def test_area_is_the_share_of_pairs_in_the_right_order() -> None:
 
 @pytest.fixture(autouse=True)
 def _small_forest(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armlab.identification.likeness.classifier.TREES", 20)
+    monkeypatch.setattr("armlab.proof.open.likeness.classifier.TREES", 20)
 
 
 def _arms(rng: np.random.Generator, number: int, real: bool, shift: float) -> list[LikenessArm]:

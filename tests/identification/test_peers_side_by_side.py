@@ -8,11 +8,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from public_copies import needs_copies
 from simulated_arm import run, structure, truth
 
-from armlab.identification.peers.exchange import PeerRun, read_runs, write_runs
-from armlab.identification.peers.side_by_side import PeerResult, compare_peers, write_peers
-from armlab.identification.real.looks import Looks
-from armlab.identification.real.study import recipe_named, study_recording
 from armlab.identification.regression import signals_of
+from armlab.proof.open.peers.exchange import PeerRun, read_runs, write_runs
+from armlab.proof.open.peers.side_by_side import PeerResult, compare_peers, write_peers
+from armlab.proof.open.real_identification.looks import Looks
+from armlab.proof.open.real_identification.study import recipe_named, study_recording
 from armlab.recordings.public import open_public_recording
 
 

@@ -10,15 +10,15 @@ from recording_folders import POSITION, SETTINGS, TORQUE, folder_with, frame
 from refusals import refusal
 
 from armlab.common.errors import DataError
-from armlab.diagnosis.compare.report import compare_recordings
-from armlab.diagnosis.diagnose import diagnose
-from armlab.diagnosis.load import nominal_payload_lines
+from armlab.diagnosis.torque.carried_load import nominal_payload_lines
+from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.identification.identifier import Identifier
 from armlab.identification.identify import IdentifyOptions, identify_recording, predict_recording
 from armlab.identification.payload import PayloadSetting, Place, gains_lines, payload_lines
 from armlab.identification.torque_model import parameter_line
 from armlab.identification.validation import error_table, run_error
 from armlab.recordings.load import load_recording
+from armlab.report.changes.report import compare_recordings
 
 ALONE = {"runs": SETTINGS["runs"][:1]}
 AS_READ = IdentifyOptions(as_read=True)
@@ -90,7 +90,7 @@ def test_every_command_refuses_what_tells_nothing_in_one_line(made: Callable[[],
         assert CASES[made] in refusal(act), name
     diagnosis = diagnose(load_recording(bad))
     assert diagnosis.status == "inconclusive"
-    assert CASES[made] in diagnosis.summary
+    assert CASES[made] in diagnosis.reason
 
 
 def test_a_prediction_asks_for_torque_and_not_for_motion(tmp_path: Path) -> None:

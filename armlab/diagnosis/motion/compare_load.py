@@ -16,11 +16,11 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import DataError
-from armlab.diagnosis.compare.comparison import Comparison, conclude, look_plainly
-from armlab.diagnosis.compare.named import NamedChange
+from armlab.diagnosis.changes.comparison import Comparison, conclude, look_plainly
+from armlab.diagnosis.changes.named import NamedChange
 from armlab.diagnosis.result import Diagnosis, Rival
 from armlab.diagnosis.settings import Settings
-from armlab.diagnosis.simulation import read_simulation
+from armlab.diagnosis.torque.rows.simulation import read_simulation
 from armlab.effects.links import PAYLOAD_FACTS
 from armlab.recordings.motion import MotionRecording
 from armlab.recordings.plain_least_squares import PlainChanges, compare_plain, prepare_rows, runs_of_motion

@@ -1,7 +1,8 @@
 """The names of a difference of a servo with their probabilities.
 
-As for torque (`armlab.diagnosis.naming`): a finding has its own name and those of its rivals, or none of them is right.
-What speaks against all of them is how little the number changes the replay, and how near it is to the simulation's.
+As for torque (`armlab.diagnosis.torque.names`): a finding has its own name and those of its rivals, or none of them is
+right. What speaks against all of them is how little the number changes the replay, and how near it is to the
+simulation's.
 """
 
 import math
@@ -9,10 +10,10 @@ import math
 import numpy as np
 
 from armlab.diagnosis.motion.diagnose import ServoFinding
-from armlab.diagnosis.naming.decide import Naming, naming_of
-from armlab.diagnosis.naming.weighing import negative_logarithm
 from armlab.diagnosis.result import Weighed, WeighedName
 from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.torque.names.decide import Naming, naming_of
+from armlab.diagnosis.torque.names.weighing import negative_logarithm
 from armlab.effects.contract import UNKNOWN
 
 LAST_LINK_EFFECTS = ("payload",)  # rivals that are at the link of the tool

@@ -8,12 +8,12 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.diagnosis.data import Observed, observe
 from armlab.diagnosis.next.moments import Index, Moments
 from armlab.diagnosis.next.question import Layout
 from armlab.diagnosis.next.sampling import Sampling, kept_columns
-from armlab.diagnosis.noise import Noise, fit_noise
 from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.torque.rows.data import Observed, observe
+from armlab.diagnosis.torque.rows.noise import Noise, fit_noise
 from armlab.effects.contract import Candidate, Scene
 from armlab.effects.model import FittedEffect, torque_in_mechanism
 from armlab.recordings.cutoff import acceleration_spectrum, noise_level

@@ -10,7 +10,6 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.diagnosis.links import link_prior
 from armlab.diagnosis.next.first_run import FirstRun, FoundEffect, PresentModel, observe_first_run
 from armlab.diagnosis.next.moments import Index, Moments, empty_moments
 from armlab.diagnosis.next.question import (
@@ -36,6 +35,7 @@ from armlab.diagnosis.next.rivals import (
 from armlab.diagnosis.next.sampling import SAMPLES_PER_ROW, Sampling, white_noise_sampling
 from armlab.diagnosis.next.verdict_file import Finding, RivalGroup, VerdictWithModel
 from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.torque.columns.links import link_prior
 from armlab.effects.contract import UNKNOWN, Candidate, Scene
 from armlab.effects.library import library
 from armlab.recordings.recording import Recording

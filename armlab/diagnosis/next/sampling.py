@@ -10,9 +10,9 @@ from scipy.ndimage import binary_dilation
 from scipy.signal import lfilter
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.data import Segment, rows_in, split_segment
-from armlab.diagnosis.noise import Noise
 from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.torque.rows.data import Segment, rows_in, split_segment
+from armlab.diagnosis.torque.rows.noise import Noise
 from armlab.effects.contract import Candidate, Scene
 from armlab.recordings.filters import Butterworth, Filter
 from problem.base_parameters import BaseParameters

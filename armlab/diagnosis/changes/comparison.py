@@ -1,0 +1,249 @@
+"""The comparison of recordings of one robot, step by step.
+
+`compare` is the whole flow: diagnose each recording (what there is), look for changes of rigid links and friction
+(`pool_plainly`), for finer ones beside a common model of all that was found where there are none (`pool_recordings`),
+name them (`name_changes`), and say what would have been seen (`list_table`).
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import date
+
+import numpy as np
+
+from armlab.common.errors import DataError, InputError
+from armlab.common.notebook import notebook_html
+from armlab.diagnosis.changes.changes import ChangeTable, Tested, make_plain_table, make_table
+from armlab.diagnosis.changes.named import NamedChange, list_table, name_changes
+from armlab.diagnosis.changes.numbers import Change, common_values, list_movements
+from armlab.diagnosis.changes.pooled import Pooled, follow_levels, pool_plainly, pool_recordings, unite_candidates
+from armlab.diagnosis.changes.soundness import SoundChanges, find_sound_changes
+from armlab.diagnosis.changes.trends import Trend, find_trends, recording_date
+from armlab.diagnosis.formats import ComparisonStatus
+from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.settings import Baseline, Settings
+from armlab.diagnosis.torque.diagnose import diagnose
+from armlab.diagnosis.torque.rows.simulation import Simulation, model_baseline, read_simulation
+from armlab.recordings.recording import Recording
+from problem.arm import Arm
+
+RUNS_DIFFER = "The runs of one recording differ as much as the recordings do: record more runs of each."
+GEOMETRY_TOLERANCE = 1e-6  # rad (m): geometry that counts as that of the same robot
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """diagnoses: of each recording alone. named: what changed, the surest first. changes: every parameter compared.
+
+    reason: of an inconclusive comparison. doubtful: what makes it so where the runs of one recording differ as much as
+    the recordings. notes: sentences on what was not used. trends: of more than two recordings,
+    each parameter that moves; dates: of the recordings.
+    """
+
+    status: ComparisonStatus
+    diagnoses: tuple[Diagnosis, ...]
+    named: tuple[NamedChange, ...] = ()
+    changes: tuple[Change, ...] = ()
+    reason: str = ""
+    doubtful: NamedChange | None = None
+    notes: tuple[str, ...] = ()
+    trends: tuple[Trend, ...] = ()
+    dates: tuple[date | None, ...] = ()
+
+    @property
+    def old(self) -> Diagnosis:
+        """Of the first recording."""
+        return self.diagnoses[0]
+
+    @property
+    def new(self) -> Diagnosis:
+        """Of the last recording."""
+        return self.diagnoses[-1]
+
+    @property
+    def arm(self) -> Arm:
+        """Of all recordings: the simulation's, with the names of its joints."""
+        return self.new.simulation.arm
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the recordings."""
+        return tuple(each.recording.name for each in self.diagnoses)
+
+    def __repr__(self) -> str:
+        """The status, what changed, and how much was compared."""
+        lines = [f"Comparison of {', '.join(map(repr, self.names))}: {self.status}"]
+        if self.doubtful is not None:
+            lines.append(f"  perhaps {self.doubtful.effect}@{self.doubtful.joint}: {self.doubtful.equation}")
+        if self.status == "inconclusive":
+            return "\n".join([*lines, f"  {self.reason}"])
+        lines += [f"  {each.effect}@{each.joint}: {each.equation}" for each in self.named]
+        return "\n".join([*lines, f"  parameters compared: {len(self.changes)}"])
+
+    def _repr_html_(self) -> str:
+        rows = [(each.effect, "" if each.joint is None else each.joint, each.equation) for each in self.named]
+        title = f"Comparison of {', '.join(self.names)}: {self.status}"
+        text = self.reason or f"parameters compared: {len(self.changes)}"
+        return notebook_html(title, text, ("effect", "joint", "change"), rows)
+
+
+def compare(
+    old: Recording,
+    new: Recording,
+    *more: Recording,
+    baseline: Baseline | None = None,
+    seed: int = 0,
+    dates: Sequence[date] = (),
+    progress: Callable[[str], None] = lambda message: None,
+) -> Comparison:
+    """What changed from the first recording to the later ones.
+
+    dates: of the recordings; those of their files if left out. Raises InputError where the recordings are not of one
+    robot, or dates are not as many.
+    """
+    for other in (new, *more):
+        _check_same_robot(old, other)
+    if dates and len(dates) != 2 + len(more):
+        raise InputError(f"{len(dates)} dates for {2 + len(more)} recordings: give one each, or none")
+    known_dates: tuple[date | None, ...] = tuple(dates)
+    if not dates:
+        known_dates = tuple(recording_date(each) for each in (old, new, *more))
+    recordings = (old, *(replace(each, arm=old.arm, simulation=old.simulation) for each in (new, *more)))
+    own = baseline or model_baseline(old)
+    diagnoses: list[Diagnosis] = []
+    for number in range(len(recordings)):
+        diagnoses.append(_diagnose_once(recordings, diagnoses, own, seed, _progress_of(number + 1, progress)))
+    return compare_diagnosed(recordings, diagnoses, baseline, known_dates, progress)
+
+
+def compare_diagnosed(
+    recordings: Sequence[Recording],
+    diagnoses: Sequence[Diagnosis],
+    baseline: Baseline | None,
+    dates: Sequence[date | None],
+    progress: Callable[[str], None] = lambda message: None,
+) -> Comparison:
+    """What changed between recordings of one robot of which each is diagnosed."""
+    simulation, settings = read_simulation(recordings[0], baseline or model_baseline(recordings[0])), Settings()
+    progress("looking for changes of links and friction")
+    seen = look_plainly(recordings, simulation, settings)
+    if seen is None or not seen.sound.named:
+        failed = next((each for each in diagnoses if each.model is None), None)
+        if failed is not None:
+            return Comparison("inconclusive", tuple(diagnoses), reason=f"{failed.recording.name}: {failed.reason}")
+        progress("looking for other changes")
+        try:
+            pooled = pool_recordings(recordings, unite_candidates(diagnoses), simulation, settings)
+        except DataError as error:
+            return Comparison("inconclusive", tuple(diagnoses), reason=str(error))
+        seen = _look(pooled, make_table)
+    return conclude(seen, diagnoses, tuple(_notes(recordings, baseline)), dates)
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """A table of recordings and the changes that it shows."""
+
+    pooled: Pooled
+    table: ChangeTable
+    sound: SoundChanges
+
+
+def look_plainly(recordings: Sequence[Recording], simulation: Simulation, settings: Settings) -> Look | None:
+    """What rigid links and friction show; None where no run is long enough."""
+    try:
+        return _look(pool_plainly(recordings, simulation, settings), make_plain_table)
+    except DataError:
+        return None
+
+
+def _look(pooled: Pooled, table_of: Callable[[Pooled], ChangeTable]) -> Look:
+    """The changes, with columns that follow what is common beside them."""
+    table = table_of(pooled)
+    sound = find_sound_changes(pooled, table)
+    if sound.named:
+        pooled = follow_levels(pooled, common_values(table, sound.named)[table.model])
+        table = table_of(pooled)
+        sound = find_sound_changes(pooled, table)
+    return Look(pooled, table, sound)
+
+
+def conclude(
+    seen: Look, diagnoses: Sequence[Diagnosis], notes: tuple[str, ...], dates: Sequence[date | None]
+) -> Comparison:
+    """The changes with their names and numbers."""
+    pooled, table, sound = seen.pooled, seen.table, seen.sound
+    named = name_changes(pooled, table, sound.named)
+    doubtful = () if sound.doubtful is None else name_changes(pooled, table, [sound.doubtful])
+    return Comparison(
+        "changed" if named else "inconclusive" if doubtful else "same",
+        tuple(diagnoses),
+        named,
+        list_table(pooled, table, sound.named),
+        reason=RUNS_DIFFER if doubtful else "",
+        doubtful=next(iter(doubtful), None),
+        notes=notes,
+        trends=_find_trends(pooled, table, sound.named, dates),
+        dates=tuple(dates),
+    )
+
+
+def _find_trends(
+    pooled: Pooled, table: ChangeTable, found: tuple[Tested, ...], dates: Sequence[date | None]
+) -> tuple[Trend, ...]:
+    """How what changed moves over more than two recordings."""
+    if len(dates) < 3:
+        return ()
+    movements = [movement for each in found for movement in list_movements(pooled, table, found, each)]
+    return find_trends(movements, dates)
+
+
+def _diagnose_once(
+    recordings: Sequence[Recording],
+    known: Sequence[Diagnosis],
+    baseline: Baseline,
+    seed: int,
+    progress: Callable[[str], None],
+) -> Diagnosis:
+    """The diagnosis of the next recording; that of an earlier one where both hold the same rows."""
+    own = recordings[len(known)]
+    for diagnosis, other in zip(known, recordings, strict=False):
+        if _same_rows(own, other):
+            return replace(diagnosis, recording=own)
+    return diagnose(own, baseline, seed, progress=progress)
+
+
+def _same_rows(one: Recording, other: Recording) -> bool:
+    return len(one.runs) == len(other.runs) and all(
+        a.role == b.role
+        and a.samples == b.samples
+        and all(np.array_equal(getattr(a, name), getattr(b, name)) for name in ("time", "position", "torque"))
+        for a, b in zip(one.runs, other.runs, strict=True)
+    )
+
+
+def _progress_of(number: int, progress: Callable[[str], None]) -> Callable[[str], None]:
+    return lambda message: progress(f"recording {number}: {message}")
+
+
+def _notes(recordings: Sequence[Recording], baseline: Baseline | None) -> Iterator[str]:
+    """What the recordings hold and the comparison does not use."""
+    runs = [run for each in recordings for run in each.runs]
+    if baseline == "simulated":
+        yield "The columns of simulated_torque are the simulation; what they lack in all recordings alike is no change."
+    elif any(run.simulated_torque is not None for run in runs):
+        yield "The columns of simulated_torque are not used: give --baseline simulated to take them as the simulation."
+    if any(run.simulated_position is not None for run in runs):
+        yield "The columns of simulated_position are not used: a comparison of torques takes the measured motion."
+
+
+def _check_same_robot(old: Recording, new: Recording) -> None:
+    pairs = zip(old.arm.joints, new.arm.joints, strict=False)
+    alike = len(old.arm) == len(new.arm) and all(
+        one.kind == other.kind
+        and np.allclose(one.before, other.before, atol=GEOMETRY_TOLERANCE)
+        and np.allclose(one.after, other.after, atol=GEOMETRY_TOLERANCE)
+        for one, other in pairs
+    )
+    if not alike:
+        raise InputError(f"{old.name} is of {old.arm.name}, {new.name} of {new.arm.name}: not the same geometry")

@@ -1,0 +1,1 @@
+"""The diagnosis of recordings with torque: rows, columns, search, evidence, names, prediction."""

@@ -1,0 +1,180 @@
+"""The stacked columns of everything that may add to the torque, and the products of the whitened ones."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.torque.rows.data import Observed
+from armlab.diagnosis.torque.rows.noise import Noise
+from armlab.effects.contract import Candidate, Scene
+from armlab.recordings.differentiate import Signals
+from problem.arm import Arm
+from problem.base_parameters import BaseParameters
+from problem.regressor import observation_matrix
+
+Place = tuple[str, int | None, tuple[int, ...], str]
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """A candidate's columns among all columns; variant: which of the shapes at its place."""
+
+    candidate: Candidate
+    variant: int
+    columns: NDArray[np.intp]
+
+    @cached_property
+    def place(self) -> Place:
+        """The effect and where it is: one group a place at most is in a model."""
+        return place_of(self.candidate)
+
+
+def place_of(candidate: Candidate) -> Place:
+    """The effect and where it is; pushes in different runs are different places."""
+    return candidate.effect, candidate.joint, candidate.joints, getattr(candidate, "run", "")
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Per joint the rows that its torque has: matrix (rows, own columns), index (own columns,) into all columns.
+
+    The first `base` columns are the base parameters; the last own column of each joint is the torque that is to be
+    explained, and has the index `size`.
+    """
+
+    base: int
+    size: int
+    groups: tuple[Group, ...]
+    matrices: tuple[Array, ...]
+    index: tuple[NDArray[np.intp], ...]
+
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
+        return len(self.matrices)
+
+    def torque_of(self, coefficients: Array) -> Array:
+        """Torque of coefficients (size,), (rows, joints)."""
+        return np.column_stack([self.torque_at(joint, coefficients) for joint in range(self.joints)])
+
+    def torque_at(self, joint: int, coefficients: Array) -> Array:
+        """Torque of coefficients (size,) at one joint, (rows,)."""
+        own = coefficients[self.index[joint][:-1]]
+        used = np.flatnonzero(own)
+        return np.asarray(self.matrices[joint][:, used] @ own[used])
+
+    @property
+    def target(self) -> Array:
+        """The torque that is to be explained, (rows, joints)."""
+        return np.column_stack([matrix[:, -1] for matrix in self.matrices])
+
+
+def filtered_columns(candidate: Candidate, scenes: Sequence[Scene], observed: Observed, same_filter: bool) -> Array:
+    """A candidate's columns through the filter of the torque, (kept rows, rows of the candidate, coefficients)."""
+    parts = []
+    for scene, signals in zip(scenes, observed.signals, strict=True):
+        columns = candidate.columns(scene)
+        parts.append(signals.filter(columns) if same_filter else columns[signals.filter.rows])
+    return np.concatenate(parts)
+
+
+def base_columns(arm: Arm, base: BaseParameters, signals: Signals, same_filter: bool = True) -> list[Array]:
+    """Per joint the columns of the base parameters that load it, through the filter of the torque or not."""
+    rigid = observation_matrix(arm, signals.motion).reshape(signals.motion.samples, len(arm), -1)
+    loading = (base.columns[base.columns >= 10 * joint] for joint in range(len(arm)))
+    parts = [rigid[:, joint, chosen] for joint, chosen in enumerate(loading)]
+    return [np.asarray(signals.filter(part) if same_filter else part[signals.filter.rows]) for part in parts]
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Filtered columns of one candidate, kept to be stacked again: (rows, rows of the candidate, coefficients)."""
+
+    candidate: Candidate
+    variant: int
+    values: Array
+
+
+def stack_columns(base: BaseParameters, rigid: list[list[Array]], blocks: Sequence[Block], target: Array) -> Columns:
+    """All columns side by side. rigid: by run, by joint. target: (rows, joints)."""
+    joints = target.shape[1]
+    start = len(base)
+    groups, matrices, index = [], [], []
+    own: list[list[Array]] = [[] for _ in range(joints)]
+    names: list[list[NDArray[np.intp]]] = [[] for _ in range(joints)]
+    for block in blocks:
+        columns = np.arange(start, start + block.values.shape[2])
+        start += len(columns)
+        groups.append(Group(block.candidate, block.variant, columns))
+        for number, row in enumerate(block.candidate.rows):
+            own[row].append(block.values[:, number])
+            names[row].append(columns)
+    for joint in range(joints):
+        first = np.concatenate([run[joint] for run in rigid])
+        matrices.append(np.column_stack([first, *own[joint], target[:, joint]]))
+        loading = np.flatnonzero(base.columns >= 10 * joint)
+        index.append(np.concatenate([loading, *names[joint], [start]]).astype(np.intp))
+    return Columns(len(base), start, tuple(groups), tuple(matrices), tuple(index))
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """gram: (size + 1, size + 1), of the identification rows of all joints, columns scaled to unit length.
+
+    The last row and column belong to the torque, which is not scaled. lengths: (size,), of the columns. heldout: per
+    joint (own + 1, own + 1) of the validation rows, in the same scale. rows: whitened identification rows a joint.
+    heldout_rows: those of validation.
+    """
+
+    gram: Array
+    lengths: Array
+    heldout: tuple[Array, ...]
+    index: tuple[NDArray[np.intp], ...]
+    rows: tuple[int, ...]
+    heldout_rows: tuple[int, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of columns, the torque aside."""
+        return len(self.gram) - 1
+
+    @property
+    def power(self) -> float:
+        """Squared length of the whitened torque."""
+        return float(self.gram[-1, -1])
+
+    def heldout_error(self, coefficients: Array) -> Array:
+        """Whitened squared error on held-out rows, (joints,); coefficients: (size,), of scaled columns."""
+        full = np.append(-coefficients, 1.0)
+        out = []
+        for gram, index in zip(self.heldout, self.index, strict=True):
+            part = full[index]
+            used = np.flatnonzero(part)
+            out.append(part[used] @ gram[np.ix_(used, used)] @ part[used])
+        return np.asarray(np.maximum(np.array(out, dtype=np.float64), 0))
+
+
+def compute_moments(columns: Columns, noise: Noise, observed: Observed) -> Moments:
+    """Whitens all columns and multiplies them."""
+    gram = np.zeros((columns.size + 1, columns.size + 1))
+    heldout, rows, held_rows = [], [], []
+    for joint, (matrix, index) in enumerate(zip(columns.matrices, columns.index, strict=True)):
+        identify = _gram(noise.white(matrix, joint, observed, "identify"))
+        gram[np.ix_(index, index)] += identify[0]
+        validate = _gram(noise.white(matrix, joint, observed, "validate"))
+        heldout.append(validate[0])
+        rows.append(identify[1])
+        held_rows.append(validate[1])
+    lengths = np.sqrt(np.diag(gram)[:-1])
+    scale = np.append(np.where(lengths > 0, lengths, 1.0), 1.0)
+    gram /= np.outer(scale, scale)
+    scaled = tuple(each / np.outer(scale[own], scale[own]) for each, own in zip(heldout, columns.index, strict=True))
+    return Moments(gram, scale[:-1], scaled, columns.index, tuple(rows), tuple(held_rows))
+
+
+def _gram(white: Array) -> tuple[Array, int]:
+    return white.T @ white, len(white)

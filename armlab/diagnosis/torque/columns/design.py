@@ -1,0 +1,158 @@
+"""What a diagnosis has on its table: the runs, the simulation, the candidates, and moments made of them."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.torque.columns.columns import (
+    Block,
+    Columns,
+    Moments,
+    base_columns,
+    compute_moments,
+    filtered_columns,
+    place_of,
+    stack_columns,
+)
+from armlab.diagnosis.torque.columns.links import LinkPrior
+from armlab.diagnosis.torque.columns.solver import Solver
+from armlab.diagnosis.torque.rows.data import Observed
+from armlab.diagnosis.torque.rows.features import Features
+from armlab.diagnosis.torque.rows.noise import Noise
+from armlab.diagnosis.torque.rows.simulation import Simulation
+from armlab.diagnosis.torque.search.surrogate import FoldedFeatures
+from armlab.effects.contract import Candidate, Family, Scene
+from armlab.effects.scene import scene_of
+from armlab.recordings.differentiate import Signals
+from problem.base_parameters import BaseParameters
+from problem.motion import Motion
+
+
+@dataclass(frozen=True, eq=False)
+class DesignMatrix:
+    """rigid: filtered columns of the base parameters by run and joint. target: measured less simulated torque,
+    filtered, (rows, joints). scenes: one a run, for the present model; calm: the same with the calm motion, for
+    candidates that follow the model. blocks: the candidates' filtered columns. families: those that offered them.
+    features, banks: of each joint, for surrogates: many of everything, and few of one kind each.
+    """
+
+    settings: Settings
+    observed: Observed
+    simulation: Simulation
+    base: BaseParameters
+    prior: LinkPrior | None
+    rigid: list[list[Array]]
+    target: Array
+    scenes: tuple[Scene, ...]
+    calm: tuple[Scene, ...]
+    blocks: tuple[Block, ...] = ()
+    families: tuple[Family, ...] = ()
+    features: tuple[FoldedFeatures, ...] = ()
+    banks: tuple[tuple[Features, ...], ...] = ()
+
+    @property
+    def places(self) -> int:
+        """Number of places with a candidate."""
+        return len({place_of(block.candidate) for block in self.blocks})
+
+    @cached_property
+    def columns(self) -> Columns:
+        """Everything stacked, once."""
+        return stack_columns(self.base, self.rigid, self.blocks, self.target)
+
+    def solver(self, noise: Noise) -> tuple[Moments, Solver]:
+        """Moments and solver under a noise model."""
+        found, groups = compute_moments(self.columns, noise, self.observed), self.columns.groups
+        scales = [group.candidate.prior_scale(self.simulation.inertial) for group in groups]
+        simulated = [self.simulation.coefficients_of(group.candidate) for group in groups]
+        tuning = self.settings.tuning.solver
+        return found, Solver(found, groups, len(self.base), self.prior, self.places, scales, simulated, tuning)
+
+    def block(self, candidate: Candidate, variant: int) -> Block:
+        """A candidate's filtered columns."""
+        same = self.settings.guards.same_filter
+        return Block(candidate, variant, filtered_columns(candidate, self.scenes_of(candidate), self.observed, same))
+
+    def scenes_of(self, candidate: Candidate) -> tuple[Scene, ...]:
+        """The scenes that a candidate sees."""
+        return self.calm if candidate.follows_model and not candidate.follows_closely else self.scenes
+
+    def with_candidates(self, families: Iterable[Family], left: Sequence[Array] | None = None) -> "DesignMatrix":
+        """With the columns of every candidate that the families offer here, shape by shape.
+
+        left: what a first fit leaves of each run, (samples, joints), for families that look at it.
+        """
+        offered = tuple(families)
+        blocks = [block for family in offered for block in self._offered_blocks(family, left)]
+        return replace(self, blocks=tuple(blocks), families=offered)
+
+    def _offered_blocks(self, family: Family, left: Sequence[Array] | None) -> list[Block]:
+        arm, scenes = self.simulation.arm, self.scenes
+        places = family.candidates(arm, scenes) if left is None else family.scan(arm, scenes, left)
+        made = [self.block(each, at) for shapes in places for at, each in enumerate(shapes) if not each.second_name]
+        return [block for block in made if _is_usable(block)]
+
+    def scanned_again(self, left: Callable[[str], Sequence[Array]]) -> "DesignMatrix":
+        """With more shapes from families that look at what a fit leaves: what was left before hid the best ones.
+
+        left: what a fit leaves of each run without an effect, (samples, joints). Blocks that were there keep their
+        numbers. A place is corrected for what both looks have compared, because the looks of its blocks add up.
+        """
+        known = {_scanned_shape(each.candidate) for each in self.blocks}
+        found = [
+            block
+            for family in self.families
+            if type(family).scan is not Family.scan
+            for block in self._offered_blocks(family, left(family.effect))
+            if block.candidate.looks > 1 and _scanned_shape(block.candidate) not in known
+        ]
+        return replace(self, blocks=(*self.blocks, *found)) if found else self
+
+    def with_blocks(self, changed: dict[int, Block]) -> "DesignMatrix":
+        """With other columns for some candidates, by their number."""
+        return replace(self, blocks=tuple(changed.get(number, block) for number, block in enumerate(self.blocks)))
+
+    def with_model(self, inertial: Array, torque: Callable[[Scene], Array]) -> "DesignMatrix":
+        """With columns that follow another present model: its links, and its torque in a scene."""
+        scenes = tuple(replace(scene, inertial=inertial, torque=torque(scene)) for scene in self.scenes)
+        calm = tuple(replace(scene, inertial=inertial, torque=torque(scene)) for scene in self.calm)
+        moved = replace(self, scenes=scenes, calm=calm)
+        follow = {
+            number: moved.block(block.candidate, block.variant)
+            for number, block in enumerate(self.blocks)
+            if block.candidate.follows_model
+        }
+        return moved.with_blocks(follow)
+
+
+def _scanned_shape(candidate: Candidate) -> tuple[object, ...]:
+    """What a scan chooses: the law, its place and its shape."""
+    return type(candidate), place_of(candidate), candidate.shape
+
+
+def build_design_matrix(
+    observed: Observed, simulation: Simulation, base: BaseParameters, prior: LinkPrior | None, settings: Settings
+) -> DesignMatrix:
+    """The table before any candidate is on it."""
+    arm = simulation.arm
+    rigid = [base_columns(arm, base, signals) for signals in observed.signals]
+    simulated = np.concatenate([simulation.filtered(signals) for signals in observed.signals])
+    inertial = simulation.inertial if simulation.inertial is not None else np.zeros(10 * len(arm))
+    scenes = tuple(_scene_of_run(signals, signals.motion, simulation, inertial) for signals in observed.signals)
+    pairs = zip(observed.signals, observed.calm, strict=True)
+    calm = tuple(_scene_of_run(signals, motion, simulation, inertial) for signals, motion in pairs)
+    return DesignMatrix(settings, observed, simulation, base, prior, rigid, observed.torque - simulated, scenes, calm)
+
+
+def _scene_of_run(signals: Signals, motion: Motion, simulation: Simulation, inertial: Array) -> Scene:
+    bare = scene_of(signals.run, motion, simulation.arm)
+    return replace(bare, inertial=inertial, torque=simulation.torque_in_mechanism(bare))
+
+
+def _is_usable(block: Block) -> bool:
+    """Columns that are finite and not all zero: a joint that does not move has none."""
+    return bool(np.isfinite(block.values).all() and np.all(np.any(block.values != 0, axis=(0, 1))))

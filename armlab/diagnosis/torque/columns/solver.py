@@ -1,0 +1,294 @@
+"""Fits and scores any set of groups from the moments alone: generalised least squares with a prior on the links.
+
+The score of a set is a log evidence: half the explained chi-square, less half the log determinant of what the data tell
+about the links beyond their prior, less a price for each group (Schwarz 1978 for its parameters, and the log of the
+number of places that were looked at: Chen and Chen 2008, extended BIC with gamma = 1).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.torque.columns.columns import Group, Moments
+from armlab.diagnosis.torque.columns.links import LinkPrior, Widths
+from armlab.diagnosis.tuning import SolverTuning
+
+MAX_OVERSHOOT = 0.1  # of a law of the simulation, by which a finding may take off more than all of it (chosen by eye)
+
+
+MAX_KEPT_FITS = 2000  # of a solver: of seven joints each takes 50 kB, and a search asks for 20,000
+
+
+@dataclass(frozen=True)
+class State:
+    """The groups of a model by number, ascending; widths: of the links' errors, None where base parameters are free."""
+
+    groups: tuple[int, ...]
+    widths: Widths | None
+
+    def plus(self, group: int) -> "State":
+        """With one more group."""
+        return State(tuple(sorted({*self.groups, group})), self.widths)
+
+    def minus(self, group: int) -> "State":
+        """Without a group."""
+        return State(tuple(each for each in self.groups if each != group), self.widths)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A fitted state. coefficients: (size,) of scaled columns. score: log evidence less prices.
+
+    columns: of the effects in the model, scaled; links: factor (base, rank) of the links' errors.
+    inverse: (rank + columns, rank + columns), the covariance where errors are as the noise model says.
+    """
+
+    state: State
+    coefficients: Array
+    score: float
+    chi_square: float
+    columns: NDArray[np.intp]
+    links: Array
+    inverse: Array
+
+
+class Solver:
+    """Solves and scores states. groups: of the columns. prior: None where there is no nominal model.
+
+    places: number of places that are looked at, the factor of the correction. scales: of each group's coefficients.
+    simulated: the coefficients that the simulation has of each group's law already, to which what is fitted adds.
+    """
+
+    def __init__(
+        self,
+        moments: Moments,
+        groups: Sequence[Group],
+        base: int,
+        prior: LinkPrior | None,
+        places: int,
+        scales: Sequence[float],
+        simulated: Sequence[Array],
+        tuning: SolverTuning,
+    ) -> None:
+        self.moments, self.groups, self.base, self.prior, self.places = moments, groups, base, prior, places
+        self.simulated, self.tuning = simulated, tuning
+        self.precisions = self._precisions(scales)
+        self._links: dict[Widths | None, tuple[Array, Array, float, float]] = {}
+        self._fits: dict[State, Fit] = {}  # those that were asked for last
+        self._held: dict[State, Fit] = {}
+        self._contained: dict[int, tuple[int, ...]] = {}
+
+    def _precisions(self, scales: Sequence[float]) -> Array:
+        """Prior precision of each scaled column, (size,)."""
+        out = np.full(self.moments.size, self.tuning.ridge)
+        for group, scale in zip(self.groups, scales, strict=True):
+            out[group.columns] += 1 / (scale * self.moments.lengths[group.columns]) ** 2
+        return out
+
+    def objection(self, group: int, values: Array, covariance: Array) -> str | None:
+        """What physics says against a group with these coefficients beside those of the simulation.
+
+        Where the arm does not have a law of the simulation, the group takes it off, and a little more by chance.
+        """
+        candidate, present = self.groups[group].candidate, (1 + MAX_OVERSHOOT) * self.simulated[group]
+        return candidate.absurdity(values) or candidate.objection(values + present, covariance)
+
+    @cached_property
+    def prices(self) -> Array:
+        """Price of each group, in units of log likelihood."""
+        return np.array([self._price(number, group) for number, group in enumerate(self.groups)])
+
+    @cached_property
+    def ranks(self) -> NDArray[np.intp]:
+        """Independent columns of each group."""
+        blocks = [self.moments.gram[np.ix_(each.columns, each.columns)] for each in self.groups]
+        share = self.tuning.min_unabsorbed_share
+        return np.array([_numerical_rank(block, share) for block in blocks], dtype=np.intp)
+
+    def _price(self, number: int, group: Group) -> float:
+        rows = sum(self.moments.rows[row] for row in group.candidate.rows)
+        parameters = self.ranks[number] + len(group.candidate.shape)
+        tried = 1 if group.candidate.facts.usual else self.places * group.candidate.looks
+        return float(0.5 * parameters * np.log(max(rows, 2)) + np.log(tried))
+
+    @cached_property
+    def unusual(self) -> NDArray[np.bool_]:
+        """Which groups are no friction or offset as every arm has them."""
+        return np.array([not each.candidate.facts.usual for each in self.groups], dtype=bool)
+
+    @cached_property
+    def replaces(self) -> NDArray[np.bool_]:
+        """Which groups take the place of which others at their joint, (groups, groups)."""
+        out = np.zeros((len(self.groups), len(self.groups)), dtype=bool)
+        for number, candidate in enumerate(each.candidate for each in self.groups):
+            for other, replaced in enumerate(each.candidate for each in self.groups if candidate.replaces):
+                out[number, other] = replaced.effect in candidate.replaces and replaced.joint == candidate.joint
+        return out
+
+    def contained(self, number: int) -> tuple[int, ...]:
+        """Numbers of the simpler effects that a group contains and has to be better than."""
+        if number not in self._contained:
+            own = self.groups[number].candidate
+            self._contained[number] = tuple(
+                other
+                for other, each in enumerate(self.groups)
+                if each.candidate.joint == own.joint
+                and (
+                    each.candidate.effect in own.facts.contains
+                    or (each.candidate.effect in own.replaces and each.candidate.facts.usual)
+                )
+            )
+        return self._contained[number]
+
+    def crowd(self, groups: Sequence[int]) -> int:
+        """How many unusual effects there are."""
+        return int(np.sum(self.unusual[list(groups)]))
+
+    def links(self, widths: Widths | None) -> tuple[Array, Array, float, float]:
+        """Factor (base, rank), its products with all columns (rank, size + 1), own precision, and the price."""
+        if widths not in self._links:
+            self._links[widths] = self._linked(widths)
+        return self._links[widths]
+
+    def _linked(self, widths: Widths | None) -> tuple[Array, Array, float, float]:
+        gram, base = self.moments.gram, self.base
+        if widths is None or self.prior is None:
+            factor, precision = np.eye(base), 10 * self.tuning.ridge
+            return factor, gram[:base], precision, 0.0
+        if not any(widths):
+            return np.empty((base, 0)), np.empty((0, len(gram))), 1.0, 0.0
+        factor = self.prior.factor(widths, self.moments.lengths[:base])
+        products = factor.T @ gram[:base]
+        inner = products[:, :base] @ factor
+        occam = 0.5 * float(np.linalg.slogdet(np.eye(len(inner)) + inner)[1])
+        sizes = {width for width in widths if width}
+        some = sum(1 for width in widths if width) if len(set(widths)) > 1 else 0
+        price = 0.5 * len(sizes) * np.log(sum(self.moments.rows)) + some * np.log(self.places)
+        return factor, products, 1.0, occam + float(price)
+
+    def fit(self, state: State) -> Fit:
+        """The fit of a state, kept for the next question."""
+        if state in self._held:
+            return self._held[state]
+        fit = self._fits.pop(state, None) or self._fitted(state)
+        self._fits[state] = fit  # as the last one
+        if len(self._fits) > MAX_KEPT_FITS:
+            del self._fits[next(iter(self._fits))]
+        return fit
+
+    def hold(self, state: State, coefficients: Array) -> None:
+        """Keeps coefficients (size,) as the fit of a state: what a constraint that columns do not know has made them.
+
+        Scores and covariances are those of the free fit, the chi-square that of these coefficients.
+        """
+        free, gram = self.fit(state), self.moments.gram
+        chi_square = float(2 * coefficients @ gram[:-1, -1] - coefficients @ gram[:-1, :-1] @ coefficients)
+        score = free.score - max(free.chi_square - chi_square, 0.0) / 2
+        self._held[state] = replace(free, coefficients=coefficients, chi_square=chi_square, score=score)
+
+    def _columns(self, state: State) -> NDArray[np.intp]:
+        parts = [self.groups[group].columns for group in state.groups]
+        return np.concatenate(parts).astype(np.intp) if parts else np.empty(0, dtype=np.intp)
+
+    def system(self, state: State) -> tuple[Array, NDArray[np.intp]]:
+        """Matrix of the normal equations, and the effects' columns."""
+        gram = self.moments.gram
+        factor, products, precision, _ = self.links(state.widths)
+        columns, rank = self._columns(state), factor.shape[1]
+        matrix = np.empty((rank + len(columns), rank + len(columns)))
+        matrix[:rank, :rank] = products[:, : self.base] @ factor + precision * np.eye(rank)
+        matrix[:rank, rank:] = products[:, columns]
+        matrix[rank:, :rank] = matrix[:rank, rank:].T
+        matrix[rank:, rank:] = gram[np.ix_(columns, columns)] + np.diag(self.precisions[columns])
+        return matrix, columns
+
+    def products(self, state: State) -> Array:
+        """Products of what a state has in its normal equations with all columns and the torque."""
+        return np.vstack([self.links(state.widths)[1], self.moments.gram[self._columns(state)]])
+
+    def _fitted(self, state: State) -> Fit:
+        matrix, columns = self.system(state)
+        factor, _, _, price = self.links(state.widths)
+        coefficients = np.zeros(self.moments.size)
+        chi_square, inverse = 0.0, np.empty((0, 0))
+        if len(matrix):
+            inverse = cho_solve(cho_factor(matrix, lower=True), np.eye(len(matrix)))
+            towards = self.products(state)[:, -1]
+            solution = inverse @ towards
+            chi_square = float(solution @ towards)
+            rank = factor.shape[1]
+            coefficients[: self.base] = factor @ solution[:rank]
+            coefficients[columns] = solution[rank:]
+        count = self.crowd(state.groups)
+        price += float(np.sum(self.prices[list(state.groups)])) + self.tuning.crowd_penalty * count * (count - 1) / 2
+        score = 0.5 * chi_square - price
+        return Fit(state, coefficients, score, chi_square, columns, factor, inverse)
+
+    def gains(self, state: State) -> Array:
+        """How much each group would raise the score, were it added: (groups,)."""
+        matrix, products = self.system(state)[0], self.products(state)
+        whole = np.zeros((0, self.moments.size + 1))
+        if len(matrix):
+            whole = solve_triangular(np.linalg.cholesky(matrix), products, lower=True)
+        out = np.empty(len(self.groups))
+        for width, (numbers, offered) in self._by_width.items():
+            out[numbers] = self._gains(whole, offered, width)
+        return out - self.prices - self.tuning.crowd_penalty * self.crowd(state.groups) * self.unusual
+
+    @cached_property
+    def _by_width(self) -> dict[int, tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        widths: dict[int, list[int]] = {}
+        for number, group in enumerate(self.groups):
+            widths.setdefault(len(group.columns), []).append(number)
+        return {
+            width: (np.array(numbers), np.stack([self.groups[number].columns for number in numbers]))
+            for width, numbers in widths.items()
+        }
+
+    def _gains(self, whole: Array, columns: NDArray[np.intp], width: int) -> Array:
+        """Half the chi-square that each group (groups, width) adds beyond what the rows of `whole` explain."""
+        gram = self.moments.gram
+        part = whole[:, columns]  # (rows, groups, width)
+        rest = gram[columns[:, :, None], columns[:, None, :]] - np.einsum("rgi,rgj->gij", part, part)
+        rest = rest + self.precisions[columns][:, :, None] * np.eye(width)
+        towards = gram[columns, -1] - np.einsum("rgi,r->gi", part, whole[:, -1])
+        # what is absorbed counts for nothing: the ridge bounds it
+        bounded = rest + self.tuning.min_unabsorbed_share * np.eye(width)
+        solved = np.linalg.solve(bounded, towards[:, :, None])[:, :, 0]
+        return np.asarray(0.5 * np.sum(towards * solved, axis=1))
+
+    def losses(self, fit: Fit) -> dict[int, float]:
+        """How much the score changes where a group of the model is taken out."""
+        rank, at = fit.links.shape[1], 0
+        crowd, out = self.tuning.crowd_penalty * (self.crowd(fit.state.groups) - 1), {}
+        for group in fit.state.groups:
+            count = len(self.groups[group].columns)
+            place = slice(rank + at, rank + at + count)
+            values = fit.coefficients[self.groups[group].columns]
+            lost = 0.5 * float(values @ np.linalg.pinv(fit.inverse[place, place], hermitian=True) @ values)
+            out[group] = float(self.prices[group]) + crowd * float(self.unusual[group]) - lost
+            at += count
+        return out
+
+    def covariance(self, fit: Fit, group: int) -> Array:
+        """Covariance of a group's coefficients, in units of its unscaled columns."""
+        columns = self.groups[group].columns
+        at = fit.links.shape[1] + int(np.flatnonzero(fit.columns == columns[0])[0])
+        block = fit.inverse[at : at + len(columns), at : at + len(columns)]
+        lengths = self.moments.lengths[columns]
+        return np.asarray(block / np.outer(lengths, lengths))
+
+    def values(self, fit: Fit, group: int) -> Array:
+        """A group's coefficients of unscaled columns."""
+        columns = self.groups[group].columns
+        return np.asarray(fit.coefficients[columns] / self.moments.lengths[columns])
+
+
+def _numerical_rank(gram: Array, least_share: float) -> int:
+    values = np.linalg.eigvalsh(gram)
+    return int(np.sum(values > least_share * max(values[-1], 1e-300)))

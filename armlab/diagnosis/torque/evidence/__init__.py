@@ -1,0 +1,1 @@
+"""What speaks for each effect that was found, and which of them hold."""

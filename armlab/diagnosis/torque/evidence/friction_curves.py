@@ -1,0 +1,88 @@
+"""Friction that no formula fits: looked for when the formulas have their shapes and the other effects their names."""
+
+from dataclasses import replace
+
+from armlab.diagnosis.torque.columns.solver import State
+from armlab.diagnosis.torque.evidence.pruning import Pruned, withdraw
+from armlab.diagnosis.torque.evidence.unknown import (
+    is_form_error,
+    is_structured,
+    predict_residual_structure,
+    predicted_share,
+    unknown_evidence,
+)
+from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_coloured_noise
+from armlab.diagnosis.torque.search.search import Search, Step, rival_formulas
+from armlab.diagnosis.torque.search.surrogate import Structure
+
+
+def find_friction_curves(pruned: Pruned) -> Pruned:
+    """The same with a curve in the place of a joint's friction where it is clearly better than every formula.
+
+    A curve beside the formulas of a search would take their place before their shapes are known. Here a curve that
+    fails a test changes nothing.
+    """
+    for joint in range(1, pruned[0].columns.joints + 1):
+        model = pruned[0]
+        least = model.solver.fit(model.state).score + model.design.settings.tuning.pruning.least_evidence
+        state = _likeliest_curve(model, joint)
+        if state is None or model.solver.fit(state).score < least:
+            continue
+        (group,) = set(state.groups) - set(model.state.groups)
+        step = Step(f"friction curve at joint {joint}", model.solver.fit(state).score)
+        tried = withdraw(replace(model, state=state, steps=(*model.steps, step)), frozenset(), "")
+        if group in tried[0].state.groups:
+            pruned = tried
+    return pruned
+
+
+def name_friction_curves(pruned: Pruned, left: tuple[Structure, ...]) -> tuple[Pruned, tuple[Structure, ...]]:
+    """The effects and the structure that is left, with friction curves where that is friction.
+
+    A curve takes the place of all friction of its joint, and has to explain most of what a surrogate does. What a
+    formula leaves is no fault of its form where it is most of all that is left.
+    """
+    model, effects, links = pruned
+    tuning = model.design.settings.tuning
+    named = False
+    for each in left:
+        own = (f"velocity_{each.joint + 1}",)
+        if each.depends_on != own or not is_structured(each, tuning):
+            continue
+        if is_form_error(each, effects, tuning.unknown) and predicted_share(each) < tuning.unknown.min_curve_error:
+            continue
+        state = _likeliest_curve(model, each.joint + 1)
+        if state is None:
+            continue
+        changed = replace(model, state=state)
+        before, after = (of.residual_at(each.joint, of.fit) for of in (model, changed))
+        evidence = unknown_evidence(model, each, before, after)
+        by_surrogate = unknown_evidence(model, each, before, before - each.prediction)
+        explained, wanted = (found.rms_before**2 - found.rms_after**2 for found in (evidence, by_surrogate))
+        if explained <= tuning.unknown.min_curve_share * wanted:
+            continue
+        (group,) = set(state.groups) - set(model.state.groups)
+        effects = {number: kept for number, kept in effects.items() if number in state.groups} | {group: evidence}
+        step = Step(f"what is left at joint {each.joint + 1} is a friction curve", model.solver.fit(state).score)
+        model, named = replace(changed, steps=(*model.steps, step)), True
+    if named:
+        left = predict_residual_structure(model, fit_coloured_noise(model))
+    return (model, effects, links), left
+
+
+def _likeliest_curve(model: FittedModel, joint: int) -> State | None:
+    """The state with the likeliest law of the last resort as the only friction law of a joint; None for none."""
+    groups, state = model.solver.groups, model.state
+    last = [
+        number
+        for number, each in enumerate(groups)
+        if each.candidate.facts.last_resort and each.candidate.joint == joint
+    ]
+    if not last or set(last) & set(state.groups):
+        return None
+    formulas = set(rival_formulas(groups, last[0]))
+    bare = State(tuple(each for each in state.groups if each not in formulas), state.widths)
+    search = Search(model.solver, model.design.settings, True, 0)
+    found = [(search.with_group(bare, number), number) for number in last]
+    fitting = [tried for tried, number in found if search.objection(tried, number) is None]
+    return max(fitting, key=lambda tried: model.solver.fit(tried).score, default=None)

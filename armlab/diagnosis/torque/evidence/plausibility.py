@@ -1,0 +1,253 @@
+"""Findings whose numbers no engineer believes, or that say nothing: no names, with the reason in the log.
+
+What an effect's parameters are on arms stands on the effect (`Parameter.plausible`, with its source). A law that fits
+with other numbers stands for structure that the library lacks, unless the evidence is overwhelming. An interval that
+holds zero, several orders of magnitude or a whole circle is no knowledge of a parameter.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from armlab.diagnosis.result import Claim
+from armlab.diagnosis.torque.evidence.added_body import mass_found_anew
+from armlab.diagnosis.torque.evidence.evidence import Evidence
+from armlab.diagnosis.torque.evidence.pruning import Pruned, look_again, withdraw
+from armlab.diagnosis.torque.names.intervals import extend_with_shapes
+from armlab.diagnosis.torque.rows.data import Observed
+from armlab.diagnosis.torque.search.fitted_model import FittedModel
+from armlab.diagnosis.torque.search.search import Step
+from armlab.diagnosis.torque.search.surrogate import Structure
+from armlab.diagnosis.tuning import PlausibilityTuning
+from armlab.effects.contract import Candidate, Kind, Parameter
+from armlab.effects.links import SolidBody
+from armlab.effects.parameters import ParameterValue, parameter_values
+
+ROUNDING = 1e-9  # of a link's torque at the joint that shows it best: a joint with less does not feel it
+
+
+def withdraw_implausible(pruned: Pruned) -> Pruned:
+    """The same without laws of friction whose numbers cannot be believed, the weakest first, special laws before usual
+    ones: usual friction takes their place. Then the search looks once more.
+
+    Another effect of which that is so stays in the model without a claim, see `unclaim_implausible`. All are kept
+    without the guard `physics_signs`.
+    """
+    withdrawn = frozenset[int]()
+    while doubts := _doubtful_friction(pruned[0], pruned[1]):
+        model, effects, _ = pruned
+        weakest = min(doubts, key=lambda group: (effects[group].usual, effects[group].score))
+        pruned = withdraw(model, frozenset({weakest}), doubts[weakest])
+        withdrawn |= {weakest}
+    again = look_again(pruned, withdrawn) if withdrawn else pruned
+    return pruned if _doubtful_friction(again[0], again[1]) else again
+
+
+def _doubtful_friction(model: FittedModel, effects: dict[int, Evidence]) -> dict[int, str]:
+    facts = {group: model.solver.groups[group].candidate.facts for group in effects}
+    doubts = doubtful_names(model, effects)
+    return {group: why for group, why in doubts.items() if facts[group].contains or facts[group].usual}
+
+
+def unclaim_implausible(
+    model: FittedModel, effects: dict[int, Evidence], left: Sequence[Structure]
+) -> tuple[FittedModel, dict[int, Evidence]]:
+    """The effects whose numbers can be believed; the log says why not. The others stay as present, not claimed.
+
+    left: what is structured beyond chance. A shift in time below one sampling interval is told by a model alone that
+    leaves none: beside what is unknown it is how the log was made.
+    """
+    doubts = doubtful_names(model, effects, exact=not left)
+    steps = list(model.steps)
+    for group, why in doubts.items():
+        candidate = model.solver.groups[group].candidate
+        steps.append(Step(f"present, not claimed: {candidate.effect} {candidate.joint}: {why}", 0.0))
+    return replace(model, steps=tuple(steps)), {group: each for group, each in effects.items() if group not in doubts}
+
+
+def doubtful_names(model: FittedModel, effects: dict[int, Evidence], *, exact: bool = False) -> dict[int, str]:
+    """Why the numbers of a name cannot be believed, for each group of which that is so; exact: of a model that is."""
+    if not effects or not model.design.settings.guards.physics_signs:
+        return {}
+    wide, observed = extend_with_shapes(model), model.design.observed
+    tuning = model.design.settings.tuning.plausibility
+    out = {}
+    for group, evidence in effects.items():
+        coefficients = model.solver.values(model.fit, group)
+        candidate = model.solver.groups[group].candidate.first_name(coefficients, model.design.scenes)
+        covariance = wide.covariance(group)
+        values = parameter_values(candidate, coefficients, covariance, wide.factor)
+        if model.solver.simulated[group].any():
+            values = tuple(map(_as_difference, values))
+        known = evidence.score >= tuning.overwhelming_evidence and evidence.gain >= tuning.overwhelming_gain
+        reason = reason_implausible(candidate, values, observed, known=known, exact=exact, tuning=tuning)
+        if len(coefficients) == 1 and abs(coefficients[0]) <= wide.factor * np.sqrt(covariance[0, 0]):
+            reason = reason or "its size may be zero"
+        if reason is not None:
+            out[group] = reason
+    return out
+
+
+def _as_difference(each: ParameterValue) -> ParameterValue:
+    """A scalar that takes off what the simulation has of a law, by its size: the difference has either sign."""
+    ends = _interval(each)
+    if isinstance(each.value, tuple) or each.value >= 0 or ends is None:
+        return each
+    return replace(each, value=-each.value, interval=(-ends[1], -ends[0]))
+
+
+def links_that_data_tell(
+    model: FittedModel, claims: Sequence[Claim], left: Sequence[Structure]
+) -> tuple[FittedModel, tuple[Claim, ...]]:
+    """The claims without those on a link or a load of which these data do not tell; the log says why not.
+
+    No parameter of a link that is off differs from zero, and it is not certain that the link is off. Or structure is
+    left without a name that is comparable with what the claim explains: at the joint that shows the claim best, or,
+    unless it is of the friction there, at another joint that feels the link; at a joint beyond the link any is, because
+    a later link may carry what was found. Or a load has another mass where it is found anew beside all that is named.
+    left: what is structured beyond chance.
+    """
+    kept, steps = [], list(model.steps)
+    for each in claims:
+        reason = reason_link_unknown(each, left, model.design.settings.tuning.plausibility)
+        reason = reason or _reason_other_mass(model, each)
+        if reason is None:
+            kept.append(each)
+        else:
+            steps.append(Step(f"present, not claimed: {each.effect} {each.joint}: {reason}", 0.0))
+    return replace(model, steps=tuple(steps)), tuple(kept)
+
+
+def reason_link_unknown(claim: Claim, left: Sequence[Structure], tuning: PlausibilityTuning) -> str | None:
+    """Why these data do not tell of a claim about a link or its load; None where they do, and for other claims."""
+    if claim.candidate is None or claim.candidate.facts.where != "link":
+        return None
+    if claim.in_links and claim.evidence.score < tuning.certain_link_evidence and not _differs_from_zero(claim):
+        return "no parameter differs from zero"
+    best, link = claim.evidence.joint, claim.candidate.joints[0]
+    for each in left:
+        if each.joint != best and _is_of_friction(each):
+            continue
+        if each.joint >= link:
+            return f"what is left without a name at joint {each.joint + 1} may be of a body that a later link carries"
+        own, unknown = (float(np.std(of)) for of in (claim.prediction[:, each.joint], each.prediction))
+        is_felt = own > ROUNDING * float(np.std(claim.prediction[:, best]))
+        if is_felt and unknown > tuning.max_unknown_ratio * own:
+            share = format(unknown / own, ".2g")
+            return (
+                f"what is left without a name at joint {each.joint + 1} is {share} times as large as its torque there"
+            )
+    return None
+
+
+def _is_of_friction(each: Structure) -> bool:
+    """Whether structure depends on the velocity and the load of its own joint alone: no link does that."""
+    joint = each.joint + 1
+    return bool(each.depends_on) and {*each.depends_on} <= {f"velocity_{joint}", f"torque_{joint}"}
+
+
+def _reason_other_mass(model: FittedModel, claim: Claim) -> str | None:
+    if not isinstance(claim.candidate, SolidBody):
+        return None
+    mass, found = claim.parameters[0], mass_found_anew(model, claim.candidate.joints[0])
+    if found is None or mass.interval is None:
+        return None
+    low, high = np.ravel(mass.interval)
+    if low <= found <= high:
+        return None
+    return f"found anew beside all that is named its mass is {found:.4g} kg, outside its interval"
+
+
+def _differs_from_zero(claim: Claim) -> bool:
+    intervals = [each.interval for each in claim.parameters if each.interval is not None]
+    ends = np.concatenate([np.reshape(each, (-1, 2)) for each in intervals]) if intervals else np.empty((0, 2))
+    return bool(np.any((ends[:, 0] > 0) | (ends[:, 1] < 0)))
+
+
+def reason_implausible(
+    candidate: Candidate,
+    values: tuple[ParameterValue, ...],
+    observed: Observed,
+    *,
+    known: bool,
+    exact: bool,
+    tuning: PlausibilityTuning,
+) -> str | None:
+    """Why these parameters are not believed, in a few words; None where they are.
+
+    known: whether the evidence is overwhelming, so that a parameter may be outside its plausible range. exact: whether
+    the model leaves nothing structured, so that a shift may be shorter than a sampling interval.
+    """
+    facts = {each.name: each for each in candidate.facts.parameters}
+    kind: Kind = getattr(candidate, "kind", "revolute")
+    for each in values:
+        parameter = facts.get(each.name)
+        if parameter is None or isinstance(each.value, tuple):
+            continue
+        reason = None if exact else _reason_below_sampling(parameter, each.value, observed)
+        reason = reason or _reason_unknown(parameter, each, tuning)
+        reason = reason or (None if known else _reason_out_of_range(parameter, each, kind))
+        if candidate.facts.axis == "cycle" and each.name == "order":
+            reason = reason or _reason_order_unknown(each, _travel(candidate, observed), tuning)
+        if reason is not None:
+            return reason
+    return None
+
+
+def _reason_below_sampling(parameter: Parameter, value: float, observed: Observed) -> str | None:
+    interval = max(1 / each.run.rate_hz for each in observed.signals)
+    if not parameter.sampled or abs(value) >= interval:
+        return None
+    return f"{parameter.name} {value:.3g}: less than one sampling interval ({interval:.3g} s) is how a log is made"
+
+
+def _reason_unknown(parameter: Parameter, each: ParameterValue, tuning: PlausibilityTuning) -> str | None:
+    """An interval that holds zero, spans orders of magnitude or is too wide for its parameter."""
+    if parameter.detail:
+        return None
+    ends = _interval(each)
+    if ends is None:
+        return f"{each.name} is not determined" if parameter.positive else None
+    low, high = ends
+    shown = f"{each.name} is between {low:.3g} and {high:.3g} {each.unit}"
+    if high - low > parameter.max_width:
+        return f"{shown}: wider than {parameter.max_width:.3g} says nothing"
+    if parameter.positive and low <= 0:
+        return f"{shown}: it may be zero"
+    if parameter.positive and high > tuning.max_interval_ratio * low:
+        return f"{shown}: not even its order of magnitude is known"
+    return None
+
+
+def _reason_out_of_range(parameter: Parameter, each: ParameterValue, kind: Kind) -> str | None:
+    """A parameter whose whole interval is outside what arms have."""
+    if parameter.plausible is None or isinstance(each.value, tuple):
+        return None
+    lowest, highest = parameter.plausible.limits(kind)
+    low, high = _interval(each) or (each.value, each.value)
+    if high >= lowest and low <= highest:
+        return None
+    usual = f"{lowest:.3g} to {highest:.3g} {each.unit} ({parameter.plausible.source})"
+    return f"{each.name} {each.value:.3g} {each.unit} is not plausible: {usual}"
+
+
+def _reason_order_unknown(each: ParameterValue, travel: float, tuning: PlausibilityTuning) -> str | None:
+    """An order that leaves the wave open over the travel, rad (m)."""
+    ends = _interval(each)
+    cycles = np.inf if ends is None else (ends[1] - ends[0]) / 2 * travel / (2 * np.pi)
+    if cycles <= tuning.max_order_error:
+        return None
+    return f"{each.name} is known to {cycles:.2g} cycles over the travel of the joint"
+
+
+def _travel(candidate: Candidate, observed: Observed) -> float:
+    return float(np.ptp(observed.kept("position")[:, candidate.rows[0]]))
+
+
+def _interval(each: ParameterValue) -> tuple[float, float] | None:
+    """The interval of a scalar parameter."""
+    if each.interval is None or isinstance(each.value, tuple):
+        return None
+    low, high = each.interval
+    return (float(low), float(high)) if not isinstance(low, tuple) and not isinstance(high, tuple) else None

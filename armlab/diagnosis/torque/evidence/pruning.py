@@ -1,0 +1,225 @@
+"""Only what passes every test stays: the weakest effect that fails one leaves, and the rest is searched anew."""
+
+from dataclasses import replace
+
+from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.torque.columns.solver import State
+from armlab.diagnosis.torque.evidence.added_body import (
+    find_body_anew,
+    hold_body,
+    holds_body,
+    impossible_bodies,
+    other_bodies,
+    payload_groups,
+    predicts_as_well,
+)
+from armlab.diagnosis.torque.evidence.evidence import Evidence, Judge
+from armlab.diagnosis.torque.search.fitted_model import FittedModel, follow_model, scan_residual, with_design
+from armlab.diagnosis.torque.search.refine import refine_shapes
+from armlab.diagnosis.torque.search.search import Search, Step
+
+Pruned = tuple[FittedModel, dict[int, Evidence], dict[int, Evidence]]
+_Passed = tuple[FittedModel, dict[int, Evidence], frozenset[int]]
+
+
+def reason_to_reject(evidence: Evidence, settings: Settings) -> str | None:
+    """Why an effect may not be claimed; None where it passes."""
+    guards, tuning = settings.guards, settings.tuning.pruning
+    if guards.physics_signs and evidence.objection is not None:
+        return evidence.objection
+    if evidence.corrected > tuning.level:
+        return f"p = {evidence.corrected:.2g} after correction"
+    if not evidence.usual and evidence.score < tuning.least_evidence and evidence.gain < tuning.self_evident_gain:
+        return f"log evidence {evidence.score:.0f}: too little for a name"
+    least = tuning.least_gain * (1.0 if evidence.repeatable else tuning.single_event_share)
+    if guards.heldout_gain and evidence.gain < least:
+        return f"held-out gain {100 * evidence.gain:.2g} %"
+    if not evidence.repeatable:
+        return None
+    level = tuning.large_gain_level if evidence.gain > tuning.large_gain else tuning.held_out_level
+    if guards.heldout_gain and not evidence.usual and evidence.held_p > level:
+        return f"held-out gain not sure (p = {evidence.held_p:.2g})"
+    if guards.heldout_gain and evidence.worse:
+        return f"validation gets worse by {-100 * evidence.validation_gain:.2g} %"
+    return None
+
+
+def prune(model: FittedModel) -> Pruned:
+    """The round with the effects that pass, and the evidence of those and of the links that do (from 0).
+
+    After a withdrawal nothing is searched until all that is left passes: what stands in for a withdrawn effect would
+    be its copy. Then the search looks once more, without the places that were withdrawn. A body that can exist is held
+    from the start, and found anew after withdrawals: they change what is left to it.
+    """
+    held = hold_body(model)
+    return _settle_links(_prune_and_search(held, other_bodies(held)))
+
+
+def _prune_and_search(model: FittedModel, banned: frozenset[int], fixed: bool = False) -> _Passed:
+    """What passes of a model, and of what the search finds once more, where that predicts as well in the end.
+
+    What is found may be a copy of what passed, so that neither is needed beside the other and both are lost.
+    fixed: whether the links' widths stay. They stay beside a body that is held, too: links that are off would take what
+    its form, which was found before, does not explain.
+    """
+    passed = _remove_failing(model, banned)
+    for _ in range(model.design.settings.tuning.pruning.max_cycles):
+        searched = _search_again(passed[0], passed[2], fixed)
+        if searched.state == passed[0].state:
+            break
+        again = _remove_failing(searched, passed[2])
+        if not _lasts(passed[0], again[0]):
+            step = Step("back to what passed before: what was found beside it does not last", passed[0].fit.score)
+            return replace(passed[0], steps=(*again[0].steps, step)), passed[1], again[2]
+        passed = again
+    return passed
+
+
+def _search_again(model: FittedModel, banned: frozenset[int], fixed: bool) -> FittedModel:
+    """What a search finds beside effects that passed."""
+    steps, widths = list(model.steps), model.state.widths
+    known = fixed or widths is None or holds_body(model)
+    search = Search(model.solver, model.design.settings, known, len(widths or ()), banned)
+    state = search.climb(model.state, steps)
+    return replace(model, state=state, steps=tuple(steps))
+
+
+def withdraw(model: FittedModel, groups: frozenset[int], why: str, before: frozenset[int] = frozenset()) -> Pruned:
+    """The same without some groups, and without what no longer passes; usual friction in the place of special laws.
+
+    before: groups that were withdrawn earlier; nor do they come back.
+    """
+    judge, steps = Judge(model, model.state), list(model.steps)
+    for group in groups:
+        candidate = model.solver.groups[group].candidate
+        steps.append(Step(f"withdrawn: {candidate.effect} {candidate.joint}: {why}", 0.0))
+    back = {other for group in groups for other in judge.in_place_of(group)}
+    state = State(tuple(sorted(set(model.state.groups) - groups | back)), model.state.widths)
+    less = replace(model, state=state, steps=tuple(steps))
+    return _settle_links(_remove_failing(less, groups | before | other_bodies(model)))
+
+
+def look_again(pruned: Pruned, withdrawn: frozenset[int]) -> Pruned:
+    """The same with what a search finds beside it, where all of that passes and is more likely in the end.
+
+    withdrawn: groups of whose places nothing is looked for.
+    """
+    model, groups = pruned[0], pruned[0].solver.groups
+    places = {groups[group].place for group in withdrawn}
+    banned = other_bodies(model) | {number for number, each in enumerate(groups) if each.place in places}
+    searched = _search_again(model, banned, fixed=False)
+    if searched.state == model.state:
+        return pruned
+    again = _settle_links(_remove_failing(searched, banned))
+    return again if again[0].fit.score > model.fit.score and _lasts(model, again[0]) else pruned
+
+
+def scan_what_is_left(pruned: Pruned) -> Pruned:
+    """The same with what scans find in what it leaves, where that passes, too, and is more likely in the end.
+
+    The first scans looked at what links and plain friction leave: what had no name then can hide a gap or a push. Nor
+    were they, or the last round, made with the links that passed: a gap is crossed where the load of these is zero.
+    """
+    before = pruned[0]
+    moved = with_design(before, follow_model(before.design, before))
+    design, known = scan_residual(moved), frozenset(range(len(before.design.blocks)))
+    if design is moved.design:
+        return pruned
+    model = with_design(moved, design)
+    found = _search_again(model, known, fixed=True)
+    if known.issuperset(found.state.groups):
+        return pruned
+    better = refine_shapes(design, found.noise, found.solver, found.state, but=known)
+    again = _settle_links(_remove_failing(with_design(found, design.with_blocks(better)) if better else found, known))
+    if again[0].fit.score > model.fit.score and _lasts(model, again[0]):
+        return again
+    step = Step("back to what passed before: what scans found beside it does not last", before.fit.score)
+    return replace(before, steps=(*again[0].steps, step)), pruned[1], pruned[2]
+
+
+def _lasts(before: FittedModel, after: FittedModel) -> bool:
+    """Whether what a search has changed predicts held-out rows as well as before."""
+    tolerance = after.design.settings.tuning.claims.body_tolerance
+    errors = [each.moments.heldout_error(each.fit.coefficients) for each in (before, after)]
+    return predicts_as_well(errors[1], errors[0], tolerance)
+
+
+def prefer_one_body(pruned: Pruned) -> Pruned:
+    """One body that can exist in the place of bodies and links of what passed, see `hold_body`, where that passes.
+
+    Bodies that cannot exist are withdrawn: these data do not tell.
+    """
+    held = hold_body(pruned[0])
+    if held is not pruned[0]:
+        tested = withdraw(held, frozenset(), "")
+        pruned = tested if payload_groups(tested[0]) else pruned
+    impossible = frozenset(impossible_bodies(pruned[0]))
+    return withdraw(pruned[0], impossible, "no body has such a mass, centre and inertia") if impossible else pruned
+
+
+def _settle_links(passed: _Passed) -> Pruned:
+    """With the links that pass; where they do not, all is tested and searched again with links as simulated."""
+    model, effects, banned = passed
+    model, links = _test_links(model)
+    if links is None:
+        model, effects, _ = _prune_and_search(model, banned, fixed=True)
+    return model, effects, links or {}
+
+
+def _remove_failing(model: FittedModel, banned: frozenset[int]) -> _Passed:
+    """The model without its failing effects, the weakest first; usual friction in the place of special laws."""
+    settings, found_anew = model.design.settings, 0
+    while True:
+        groups, state = model.solver.groups, model.state
+        judge = Judge(model, state)
+        effects = judge.effects()
+        bad = {group: why for group, each in effects.items() if (why := reason_to_reject(each, settings)) is not None}
+        if not bad:
+            held = find_body_anew(model)
+            if held is model or found_anew >= settings.tuning.pruning.max_cycles:
+                return model, effects, banned
+            model, found_anew = held, found_anew + 1
+            continue
+        weakest = min(bad, key=lambda group: (not judge.simpler(group), effects[group].score))
+        gone = _groups_to_remove(judge, weakest)
+        steps = list(model.steps)
+        for group in gone:
+            what = groups[group].candidate
+            steps.append(Step(f"withdrawn: {what.effect} {what.joint}: {bad.get(group, bad[weakest])}", 0.0))
+        places = {groups[group].place for group in gone}
+        banned |= {number for number, each in enumerate(groups) if each.place in places}
+        back = {other for group in gone for other in judge.in_place_of(group)}
+        state = State(tuple(sorted(set(state.groups) - gone | back)), state.widths)
+        model = replace(model, state=state, steps=tuple(steps))
+
+
+def _groups_to_remove(judge: Judge, weakest: int) -> set[int]:
+    """The group that fails; usual friction beside a special law takes that law with it, if it is likelier alone."""
+    solver, state = judge.model.solver, judge.state
+    joint = solver.groups[weakest].candidate.joint
+    special = {each for each in state.groups if judge.simpler(each) and solver.groups[each].candidate.joint == joint}
+    if not solver.groups[weakest].candidate.facts.usual or not special:
+        return {weakest}
+    usual = {other for group in special for other in judge.simpler(group)}
+    plain = State(tuple(sorted(set(state.groups) - special | usual)), state.widths)
+    return {weakest} if solver.fit(state.minus(weakest)).score > solver.fit(plain).score else special
+
+
+def _test_links(model: FittedModel) -> tuple[FittedModel, dict[int, Evidence] | None]:
+    """The model, and the links that may be claimed: those that pass alone, or the likeliest if they do together.
+
+    They stay as wide as they were found as long as any passes: that they are off is no claim about each. None where
+    they had to be brought back to the simulation.
+    """
+    state, settings = model.state, model.design.settings
+    judge = Judge(model, state)
+    links = judge.links()
+    if not links:
+        return model, {}
+    passed = {link: each for link, each in links.items() if reason_to_reject(each, settings) is None}
+    together = judge.together()
+    if passed or reason_to_reject(together, settings) is None:
+        return model, passed or {max(links, key=lambda link: links[link].score): together}
+    step = Step(f"withdrawn: links: {reason_to_reject(together, settings)}", 0.0)
+    back = State(state.groups, (0.0,) * len(state.widths or ()))
+    return replace(model, state=back, steps=(*model.steps, step)), None

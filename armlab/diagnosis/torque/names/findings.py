@@ -1,0 +1,184 @@
+"""Findings: how each may be stated, which causes they have, and which of them are minor.
+
+A finding is stated by its name, as one of a few names, as a cause without its law, or not at all. Causes count by the
+share of the error that they explain.
+"""
+
+from collections.abc import Sequence, Set
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from armlab.diagnosis.result import Claim, Member, Part
+from armlab.diagnosis.torque.names.decide import MIN_CAUSE_PROBABILITY
+from armlab.diagnosis.torque.predict.parts import UNKNOWN_CAUSE, cause_of
+from armlab.effects.contract import UNKNOWN
+from armlab.effects.library import effect_named
+
+MIN_NAME_PROBABILITY = 0.9  # of a name, and of all names of a class together
+MAX_CLASS_NAMES = 3
+FRICTION = "friction"
+TOLD_SHARE = 0.95  # of the error: causes are told until they explain as much
+MAX_TOLD_CAUSES = 4
+MAX_TOLD_OF_JOINT = 2  # findings
+ROUNDING = 1e-4  # of a held-out error: a removal that changes less changes nothing that is shown
+
+Kind = Literal["name", "class", "cause", "nothing"]
+
+
+@dataclass(frozen=True)
+class Statement:
+    """effects: ids, the likeliest first: one of a name or a cause, two or three of a class. probability: of them."""
+
+    kind: Kind
+    effects: tuple[str, ...]
+    probability: float
+
+
+def statement_of(claim: Claim) -> Statement:
+    """How a finding is stated. A finding whose names were not weighed has its name."""
+    if claim.probability is None:
+        return Statement("name", (claim.effect,), 1.0)
+    return state_name(claim.effect, claim.probability, claim.members, {claim.joint, *claim.joints})
+
+
+def state_name(effect: str, probability: float, members: Sequence[Member], places: Set[int | None]) -> Statement:
+    """How an effect with a probability is stated, of a class of names with theirs. places: joints of the finding."""
+    if probability >= MIN_NAME_PROBABILITY:
+        return Statement("name", (effect,), probability)
+    here = [each for each in members if each.effect != UNKNOWN.id and each.joint in places]
+    names = sorted(here, key=lambda each: -each.probability)
+    effects, total = list[str](), 0.0
+    for each in names[:MAX_CLASS_NAMES]:
+        effects.append(each.effect)
+        total += each.probability
+        if total >= MIN_NAME_PROBABILITY:
+            kind: Kind = "class" if effect in effects else "nothing"
+            return Statement(kind, tuple(effects), total)
+    chance = max(probability, _probability_of_friction(effect, names))
+    return Statement("cause" if chance >= MIN_CAUSE_PROBABILITY else "nothing", (effect,), chance)
+
+
+def _probability_of_friction(effect: str, names: Sequence[Member]) -> float:
+    """All laws of friction together, of an effect that is one; else 0."""
+    if effect_named(effect).cause != FRICTION:
+        return 0.0
+    return sum(each.probability for each in names if effect_named(each.effect).cause == FRICTION)
+
+
+@dataclass(frozen=True)
+class ToldCause:
+    """Findings with one cause. joints: from 1, none for the whole robot. findings: their places among the claims.
+
+    share: of the error above the noise.
+    """
+
+    cause: str
+    joints: tuple[int, ...]
+    share: float
+    findings: tuple[int, ...]
+
+
+def causes_of(parts: Sequence[Part]) -> tuple[ToldCause, ...]:
+    """The causes with findings, the one with the largest share first."""
+    grouped: dict[str, list[Part]] = {}
+    for part in parts:
+        if part.claims:
+            grouped.setdefault(part.cause, []).append(part)
+    causes = [
+        ToldCause(
+            cause,
+            tuple(sorted({part.joint for part in own if part.joint is not None})),
+            float(sum(part.share for part in own)),
+            tuple(sorted({number for part in own for number in part.claims})),
+        )
+        for cause, own in grouped.items()
+    ]
+    return tuple(sorted(causes, key=lambda each: -each.share))
+
+
+def leading_causes(causes: Sequence[ToldCause]) -> tuple[ToldCause, ...]:
+    """The largest causes, until they explain nearly all; what explains less than the rest that may stay open is none.
+
+    The largest leads whatever it explains.
+    """
+    out, told = list[ToldCause](), 0.0
+    for each in causes[:MAX_TOLD_CAUSES]:
+        if out and (told >= TOLD_SHARE or each.share < 1 - TOLD_SHARE):
+            break
+        out.append(each)
+        told += each.share
+    return tuple(out)
+
+
+def finding_shares(parts: Sequence[Part], findings: int) -> tuple[float, ...]:
+    """The share of the error that each finding explains; those of a cause sum to its own."""
+    shares = [0.0] * findings
+    for part in parts:
+        for number, share in zip(part.claims, part.shares, strict=True):
+            shares[number] += share
+    return tuple(shares)
+
+
+def stated_findings(claims: Sequence[Claim], joints: int) -> tuple[Claim, ...]:
+    """The findings among claims: what may be stated, and is missed where it is taken away.
+
+    An effect of the whole robot that is missed at one joint at most is minor. joints: of the arm.
+    """
+    stated = (each for each in claims if statement_of(each).kind != "nothing" and _is_missed(each))
+    return tuple(replace(each, minor=True) if _is_of_one_place(each, joints) else each for each in stated)
+
+
+def _is_missed(claim: Claim) -> bool:
+    return claim.removal is None or claim.removal.growth > ROUNDING
+
+
+def _is_of_one_place(claim: Claim, joints: int) -> bool:
+    """Whether an effect of the whole robot is missed at one joint at most, or the error of another falls without it."""
+    removal = claim.removal
+    if removal is None or joints == 1 or effect_named(claim.effect).where != "robot":
+        return False
+    return len(removal.joints) <= 1 or bool(removal.better)
+
+
+def without_lesser_unknowns(claims: Sequence[Claim], parts: Sequence[Part]) -> tuple[Claim, ...]:
+    """The findings without those that have no name, but where they are a leading cause."""
+    leads = any(each.cause == UNKNOWN_CAUSE for each in leading_causes(causes_of(parts)))
+    return tuple(each for each in claims if each.effect != UNKNOWN.id or leads)
+
+
+def with_minor_ones(claims: Sequence[Claim], parts: Sequence[Part]) -> tuple[Claim, ...]:
+    """The findings, those marked that are minor.
+
+    Minor are all findings about a part that nobody would miss; of a joint or a link those beyond two, of which
+    the most missed one of each cause comes first; and those of causes beyond the four largest.
+    """
+    out = list(claims)
+    for part in parts:
+        if part.removal is not None and part.removal.is_minor:
+            _mark(out, part.claims)
+    places: dict[tuple[bool, int | None], list[int]] = {}
+    for number, claim in enumerate(out):
+        if not claim.minor:
+            places.setdefault((effect_named(claim.effect).where == "link", claim.joint), []).append(number)
+    for numbers in places.values():
+        _mark(out, _by_weight(numbers, out)[MAX_TOLD_OF_JOINT:])
+    told = [each for each in causes_of(parts) if not all(out[number].minor for number in each.findings)]
+    for each in told[MAX_TOLD_CAUSES:]:
+        _mark(out, each.findings)
+    return tuple(out)
+
+
+def _by_weight(numbers: Sequence[int], claims: Sequence[Claim]) -> list[int]:
+    """Findings of one place: of each cause the one that is missed most, then the others, those missed most first."""
+    missed = sorted(numbers, key=lambda each: -_growth(claims[each]))
+    first = {cause_of(effect_named(claims[each].effect)): each for each in reversed(missed)}.values()
+    return sorted(missed, key=lambda each: each not in first)
+
+
+def _growth(claim: Claim) -> float:
+    return claim.removal.growth if claim.removal is not None else float("inf")
+
+
+def _mark(claims: list[Claim], numbers: Sequence[int]) -> None:
+    for number in numbers:
+        claims[number] = replace(claims[number], minor=True)

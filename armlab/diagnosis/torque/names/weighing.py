@@ -1,0 +1,373 @@
+"""What speaks for each name that a finding could have, and for none of them: the numbers behind its probabilities.
+
+Every candidate of the library takes the place of the finding in turn, everything else fitted anew. What its law lacks
+of the best log evidence, and what it predicts worse, speaks against a name. That none is right is likelier the more
+structure is left beside the finding, the better a flexible law does in its place, and the more is unusual about its
+joint. It is likelier, too, where the errors of the model are coloured, for they are then more than noise, and where a
+finding explains less of the validation runs. Three kinds of findings are weighed, each with numbers of its own: what
+passed all tests (`found`), what would still raise the log evidence (`left`), and structure of which only a surrogate
+knows (`structure`).
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.result import Weighed, WeighedName
+from armlab.diagnosis.torque.columns.blocks import rows_of_fit
+from armlab.diagnosis.torque.columns.links import Widths
+from armlab.diagnosis.torque.columns.solver import Fit, State
+from armlab.diagnosis.torque.evidence.added_body import PlacedBody, payload_groups, place_body
+from armlab.diagnosis.torque.evidence.evidence import Evidence
+from armlab.diagnosis.torque.evidence.unknown import flexible_gain, is_structured, predicted_share
+from armlab.diagnosis.torque.search.fitted_model import FittedModel
+from armlab.diagnosis.torque.search.search import Search
+from armlab.diagnosis.torque.search.surrogate import Structure
+from armlab.effects.contract import UNKNOWN, Candidate
+from armlab.effects.library import effect_named
+from armlab.effects.links import INERTIAL_ERROR_FACTS, PAYLOAD_FACTS
+
+Place = int | None  # a joint or link, from 1; None for the whole robot
+Kind = Literal["found", "left", "structure"]
+LEAST_GAIN = 0.02  # of the held-out error, where gains are compared as ratios
+MOST_BENT = 30.0  # log likelihood; beyond it a law is certain to bend
+MOST_COLOUR = 1.0  # of errors, a logarithm; beyond, the rate of samples says more than the arm does
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A law in the place of a finding. score: of the model with it; growth: of the held-out error by it, a share.
+
+    own: whether the search took it. early: whether it shifts the torque of a joint that sticks to before its motion,
+    as friction at rest may seem to. in_motion: what such a shift adds to the log likelihood of rows in motion.
+    """
+
+    effect: str
+    joint: Place
+    joints: tuple[int, ...]
+    score: float
+    growth: float
+    own: bool = False
+    early: bool = False
+    in_motion: float | None = None
+
+
+def weigh_effect(model: FittedModel, group: int, claimed: Mapping[int, Evidence], left: Sequence[Structure]) -> Weighed:
+    """The names of an effect of a model. claimed: all its effects; left: structure of its joints."""
+    evidence, without, bent = claimed[group], model.state.minus(group), 0.0
+    candidate = model.solver.groups[group].candidate
+    trials = list(_in_place(model, without, group, beside=model.state))
+    trials += _other_friction(model, without, group)
+    if group in payload_groups(model) and model.design.prior is not None:
+        trials += _bodies(model, without, place_body(model, without), candidate.joints[0])
+    others = [each for each in claimed if each != group]
+    none = _against_found(model, evidence, candidate.joint, others, left)
+    if candidate.facts.usual:
+        none["found usual"] = 1.0
+    else:
+        none["found flexible"] = _flexible_ratio(model, without, evidence)
+        if candidate.facts.scales_torque:
+            bent = _bent_gain(model, without, group)
+            none["found bent"] = float(np.log1p(min(bent, MOST_BENT)))
+    return _weighed("found", trials, none, candidate.joint, candidate.joints, model, model.fit.score + bent)
+
+
+def weigh_link(
+    model: FittedModel,
+    link: int,
+    evidence: Evidence,
+    claimed: Mapping[int, Evidence],
+    left: Sequence[Structure],
+) -> Weighed:
+    """The names of a link (from 0) that is off. claimed: the effects of the model."""
+    widths = model.state.widths or ()
+    without = State(model.state.groups, _changed(widths, link, 0.0))
+    trials = [_Trial(INERTIAL_ERROR_FACTS.id, link + 1, (), model.fit.score, 0.0, own=True)]
+    trials += _in_place(model, without, None, beside=model.state)
+    trials += _bodies(model, without, place_body(model, without), None)
+    trials += _other_links(model, without, link, max(widths))
+    none = _against_found(model, evidence, link + 1, list(claimed), left)
+    none |= {"found link": 1.0, "found flexible": _flexible_ratio(model, without, evidence)}
+    return _weighed("found", trials, none, link + 1, (), model)
+
+
+def weigh_addition(
+    model: FittedModel, group: int, added: State, evidence: Evidence, left: Sequence[Structure]
+) -> Weighed:
+    """The names of what a group would still explain beside a model that does not hold it.
+
+    added: the state with it; evidence: of the group in that state. left: structure that the model leaves at its joints.
+    """
+    candidate = model.solver.groups[group].candidate
+    none = {
+        "left none": 1.0,
+        "left p": negative_logarithm(evidence.corrected, 30) / 10,
+        "left chance": negative_logarithm(evidence.corrected, 6) / 6,
+        "left held-out chance": negative_logarithm(evidence.held_p, 6) / 6,
+        "left gain": float(np.log1p(10 * max(evidence.gain, 0.0))),
+        "left validated": float(np.clip(5 * evidence.validation_gain, -1, 1)),
+        "left worse": float(evidence.worse),
+        "left colour": _colour(model, evidence.joint),
+        "left structure": _structured_share(model, left, evidence.joint),
+        "left structure chance": _structure_chance(left, evidence.joint),
+        "left flexible": _flexible_ratio(model, model.state, evidence),
+    }
+    trials = _in_place(model, model.state, group, beside=added)
+    return _weighed("left", trials, none, candidate.joint, candidate.joints, model)
+
+
+def weigh_structure(model: FittedModel, structure: Structure, claimed: Iterable[int]) -> Weighed:
+    """The names of structure that only a surrogate explains. claimed: effects of the model."""
+    joint = structure.joint + 1
+    none = {
+        "structure none": 1.0,
+        "structure gain": float(np.log1p(structure.gain)),
+        "structure colour": _colour(model, structure.joint),
+        "structure beside": float(_unusual_at(model, joint, claimed)),
+    }
+    trials = _in_place(model, model.state, None, structure.joint)
+    return _weighed("structure", trials, none, joint, (joint,), model)
+
+
+def _weighed(
+    kind: Kind,
+    trials: Iterable[_Trial],
+    none: Mapping[str, float],
+    joint: Place,
+    joints: tuple[int, ...],
+    model: FittedModel,
+    nameless: float = -np.inf,
+) -> Weighed:
+    """Each name once, by its likeliest law, and none of them. nameless: the score of a law that has no name."""
+    ordered = sorted(trials, key=lambda each: (not each.own, -each.score))
+    known: dict[tuple[str, Place], _Trial] = {}
+    for each in ordered:
+        if kind == "found" or each.score > model.fit.score:
+            known.setdefault((each.effect, each.joint), each)
+    best = max((*(each.score for each in known.values()), nameless))
+    names = [
+        WeighedName(each.effect, each.joint, each.joints, _for_name(kind, each, best, model.fit.score))
+        for each in known.values()
+    ]
+    return (*names, WeighedName(UNKNOWN.id, joint, joints, none))
+
+
+def _for_name(kind: Kind, trial: _Trial, best: float, without: float) -> dict[str, float]:
+    """best: the largest score of a trial; without: the score of a model that holds none of them."""
+    deficit = best - trial.score
+    out = {
+        f"is {trial.effect}": 1.0,
+        f"{kind} deficit": float(np.log1p(deficit)),
+        f"{kind} near deficit": min(deficit, 30.0) / 10,
+    }
+    if kind != "structure":
+        out[f"{kind} searched"] = float(trial.own)
+    if trial.in_motion is not None:
+        out |= {
+            "shifts where a joint sticks": 1.0,
+            "early where a joint sticks": float(trial.early),
+            "shifts in motion": float(np.log1p(max(trial.in_motion, 0.0))),
+        }
+    if kind == "found":
+        return out | {"found growth": min(float(np.log1p(10 * max(trial.growth, 0.0))), 3.0)}
+    return out | {f"{kind} earned": float(np.log1p(trial.score - without))}
+
+
+def _against_found(
+    model: FittedModel, evidence: Evidence, joint: Place, others: Sequence[int], left: Sequence[Structure]
+) -> dict[str, float]:
+    share = _structured_share(model, left, evidence.joint)
+    unusual = [each for each in others if model.solver.unusual[each]]
+    return {
+        "found none": 1.0,
+        "found score": float(np.log1p(max(evidence.score, 0.0))) / 5,
+        "found gain": float(np.log1p(max(evidence.gain, 0.0))),
+        "found p": negative_logarithm(evidence.corrected, 30) / 10,
+        "found validated": _validated(evidence),
+        "found colour": _colour(model, evidence.joint),
+        "found structure": float(np.log1p(share / max(evidence.gain, 1e-3))),
+        "found structure chance": _structure_chance(left, evidence.joint),
+        "found structure elsewhere": float(any(is_structured(each, model.design.settings.tuning) for each in left)),
+        "found beside": float(_unusual_at(model, joint, others)),
+        "found crowd": float(len(unusual)),
+        "found links off": float(any(model.state.widths or ())),
+    }
+
+
+def _validated(evidence: Evidence) -> float:
+    """The logarithm of how much more a finding explains of validation runs than of those it was found on."""
+    ratio = (1 + max(evidence.validation_gain, 0.0)) / (1 + max(evidence.gain, 0.0))
+    return float(np.clip(np.log(ratio), -2.0, 2.0))
+
+
+def _colour(model: FittedModel, joint: int) -> float:
+    """How coloured the errors of a joint (from 0) are; more than noise for certain is not told apart."""
+    return min(float(model.colours[joint]), MOST_COLOUR)
+
+
+def _structure_chance(left: Sequence[Structure], joint: int) -> float:
+    """How clear it is that a joint (from 0) has structure left, significant or not."""
+    return max((negative_logarithm(each.p_value, 4) / 4 for each in left if each.joint == joint), default=0.0)
+
+
+def negative_logarithm(p_value: float, most: int) -> float:
+    """-log10 of a p-value, at most so many."""
+    return float(-np.log10(max(p_value, 10.0**-most)))
+
+
+def _structured_share(model: FittedModel, left: Sequence[Structure], joint: int) -> float:
+    """What a surrogate predicts of what is left at a joint (from 0), a share; 0 where it is not more than chance."""
+    tuning = model.design.settings.tuning
+    here = (each for each in left if each.joint == joint and is_structured(each, tuning))
+    return max((predicted_share(each) for each in here), default=0.0)
+
+
+def _flexible_ratio(model: FittedModel, without: State, evidence: Evidence) -> float:
+    """The logarithm of how much more a flexible law explains than a finding does in whose place it stands."""
+    flexible = flexible_gain(model, without, evidence.joint)
+    ratio = (max(flexible, 0.0) + LEAST_GAIN) / (max(evidence.gain, 0.0) + LEAST_GAIN)
+    return max(float(np.log(ratio)), -2.0)
+
+
+def _bent_gain(model: FittedModel, without: State, group: int) -> float:
+    """By how much a scale that bends raises the log likelihood more than the scale of the library in whose place it is.
+
+    It is the square of the torque that is scaled, with its sign or without. A scale that differs by the sign of the
+    torque has a column for each sign: their sum is that torque.
+    """
+    joint, columns = model.solver.groups[group].candidate.rows[0], model.solver.groups[group].columns
+    law, whole = np.zeros((2, model.moments.size))
+    law[columns], whole[columns] = model.solver.values(model.fit, group), 1.0
+    own, scaled = (model.columns.torque_at(joint, each) for each in (law, whole))
+    gains = _log_gains(model, without, joint, np.column_stack([own, scaled**2, scaled * abs(scaled)]))
+    return float(max(gains[1:].max() - gains[0], 0.0))
+
+
+def _log_gains(model: FittedModel, state: State, joint: int, torques: Array) -> Array:
+    """How much each torque (rows, laws) at a joint (from 0) would raise the log likelihood beside a state, (laws,)."""
+    fit, observed = model.solver.fit(state), model.design.observed
+    design, left = rows_of_fit(model.columns, fit, model.moments.lengths, joint)
+    stacked = np.column_stack([torques, design, left])
+    white = model.noise.white(stacked, joint, observed, "identify")
+    count = torques.shape[1]
+    laws, rows, errors = white[:, :count], white[:, count:-1], white[:, -1]
+    lengths, shared = np.sum(laws**2, axis=0), rows.T @ laws
+    # what the state absorbs counts for nothing
+    alone = lengths - np.einsum("pl,pq,ql->l", shared, fit.inverse, shared)
+    least = model.design.settings.tuning.solver.min_unabsorbed_share * lengths
+    return np.asarray((laws.T @ errors) ** 2 / (2 * np.maximum(alone, least) + 1e-300))
+
+
+def _unusual_at(model: FittedModel, joint: Place, groups: Iterable[int]) -> int:
+    """How many of these groups are at a joint and not its friction as every joint has it."""
+    facts = [model.solver.groups[each].candidate for each in groups]
+    return sum(each.joint == joint and not (each.facts.usual and each.facts.dissipates) for each in facts)
+
+
+def _in_place(
+    model: FittedModel, without: State, own: int | None, joint: int | None = None, beside: State | None = None
+) -> Iterator[_Trial]:
+    """The likeliest law of each effect at each place beside a state, the likeliest first.
+
+    own: the group that stands there; its effect is always among them. joint: from 0, where the torque has to act.
+    beside: the state with what is weighed; what it would still raise as much is another effect, and no rival.
+    """
+    solver, tuning = model.solver, model.design.settings.tuning.naming
+    search, known = Search(solver, model.design.settings, True, 0), _held_out(model)
+    scores, seen = search.gains(without), set[tuple[str, Place]]()
+    taken = None if own is None else (solver.groups[own].candidate.effect, solver.groups[own].candidate.joint)
+    others = frozenset() if beside is None else _independent(search, scores, beside, tuning.max_independent)
+    for number in map(int, np.argsort(-scores)):
+        candidate = solver.groups[number].candidate
+        key = candidate.effect, candidate.joint
+        full = len(seen) >= tuning.names
+        if full and (taken is None or taken in seen):
+            break
+        if key in seen or (full and key != taken) or (joint is not None and joint not in candidate.rows):
+            continue
+        if number != own and (number in others or search.has_no_room(without, number)):
+            continue
+        state = search.with_group(without, number)
+        if number != own and search.objection(state, number) is not None:
+            continue
+        seen.add(key)
+        fit = solver.fit(state)
+        growth = _growth(model.moments.heldout_error(fit.coefficients), known)
+        named = candidate.first_name(solver.values(fit, number), model.design.scenes)
+        trial = _Trial(named.effect, named.joint, named.joints, fit.score, growth, key == taken)
+        if candidate.facts.cause == "timing" and _sticks_where_it_acts(model, state, candidate):
+            early = bool(solver.values(fit, number)[0] < 0)
+            trial = replace(trial, early=early, in_motion=_gain_in_motion(model, without, fit, candidate.rows))
+        yield trial
+
+
+def _other_friction(model: FittedModel, without: State, group: int) -> Iterator[_Trial]:
+    """Other friction of a law's joint, beside the usual friction whose place the law took."""
+    groups = model.solver.groups
+    replaced = {each for each in model.solver.contained(group) if groups[each].candidate.facts.usual}
+    if not replaced <= set(without.groups):
+        plain = State(tuple(sorted({*without.groups, *replaced})), without.widths)
+        for trial in _in_place(model, plain, group, beside=model.state):
+            if trial.joint == groups[group].candidate.joint and effect_named(trial.effect).dissipates:
+                yield trial
+
+
+def _sticks_where_it_acts(model: FittedModel, state: State, candidate: Candidate) -> bool:
+    """Whether friction of a state that sticks acts where a law does."""
+    facts = [model.solver.groups[each].candidate for each in state.groups]
+    return any(each.facts.sticks and each.rows[0] in candidate.rows for each in facts)
+
+
+def _gain_in_motion(model: FittedModel, without: State, fit: Fit, joints: Sequence[int]) -> float:
+    """By how much the log likelihood of rows in motion is larger with a fit than without it, at some joints."""
+    observed, less, gain = model.design.observed, model.solver.fit(without), 0.0
+    noise = model.noise.in_motion(observed)
+    for joint in joints:
+        left = np.column_stack([model.residual_at(joint, each) for each in (less, fit)])
+        white = noise.white(left, joint, observed, "identify")
+        gain += float(np.sum(white[:, 0] ** 2) - np.sum(white[:, 1] ** 2)) / 2
+    return gain
+
+
+def _independent(search: Search, scores: Array, beside: State, share: float) -> frozenset[int]:
+    """Groups that raise the score of a state nearly as much as they do without what is weighed there.
+
+    scores: how much they do without it. share: of that, which is no less than nearly as much.
+    """
+    keep = search.gains(beside) > share * np.maximum(scores, 0.0)
+    return frozenset(int(each) for each in np.flatnonzero(keep) if not search.has_no_room(beside, int(each)))
+
+
+def _bodies(model: FittedModel, without: State, placed: Sequence[PlacedBody], own: int | None) -> Iterator[_Trial]:
+    """A body that can exist at each link. own: the link whose body is known already."""
+    solver, known = model.solver, _held_out(model)
+    crowd = solver.tuning.crowd_penalty * solver.crowd(without.groups)
+    for each in placed:
+        if each.link != own:
+            score = solver.fit(without).score + each.gain - float(solver.prices[each.group]) - crowd
+            yield _Trial(PAYLOAD_FACTS.id, each.link, (), score, _growth(each.error, known))
+
+
+def _other_links(model: FittedModel, without: State, link: int, width: float) -> Iterator[_Trial]:
+    """Another link that is off in the place of one (from 0)."""
+    known, widths = _held_out(model), without.widths or ()
+    for other in range(len(widths)):
+        if other != link:
+            fit = model.solver.fit(State(without.groups, _changed(widths, other, width)))
+            growth = _growth(model.moments.heldout_error(fit.coefficients), known)
+            yield _Trial(INERTIAL_ERROR_FACTS.id, other + 1, (), fit.score, growth)
+
+
+def _held_out(model: FittedModel) -> Array:
+    return model.moments.heldout_error(model.fit.coefficients)
+
+
+def _growth(error: Array, known: Array) -> float:
+    return float(np.max(error / np.maximum(known, 1e-300))) - 1
+
+
+def _changed(widths: Widths, link: int, width: float) -> Widths:
+    return tuple(width if other == link else each for other, each in enumerate(widths))

@@ -1,0 +1,99 @@
+"""Plain least squares beside the model that predicts: the choice between them, inside the runs that identify.
+
+Both predict the same rows on blocks of time that are left out in turn, behind one filter. Where plain least squares
+predicts them better, over the joints and by more than a small share, it is what is delivered. Runs that validate take
+no part in the choice.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armlab.common.arrays import Array
+from armlab.common.errors import DataError
+from armlab.diagnosis.torque.predict.prediction import identification_runs
+from armlab.diagnosis.torque.rows.data import Observed, rows_in
+from armlab.identification.identifier import Identifier
+from armlab.identification.torque_model import TorqueModel
+from armlab.recordings.cutoff_trial import choose_cutoff_hz
+from armlab.recordings.plain_least_squares import PlainModel, fit_plain_rows, prepare_rows
+from armlab.recordings.recording import Run
+from problem.arm import Arm
+
+PARAMETER_OF = {
+    "rotor_inertia": "rotor_inertia",
+    "coulomb_friction": "coulomb",
+    "viscous_friction": "viscous",
+    "torque_offset": "offset",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Yardstick:
+    """Plain least squares on the runs that identify. cutoff_hz: that predicts best inside them."""
+
+    model: PlainModel
+    cutoff_hz: float
+
+    def residual(self, observed: Observed) -> Array:
+        """What it leaves behind the filter of the torque, (rows, joints), N m (N)."""
+        return np.concatenate([each.torque - each.filter(self.model.predict(each.run)) for each in observed.signals])
+
+    def as_torque_model(self, runs: Sequence[Run]) -> TorqueModel:
+        """The same as a model that goes to files; intervals are of the identification with the same terms."""
+        plain, arm = self.model, self.model.layout.arm
+        fitted = Identifier(arm, cutoff_hz=self.cutoff_hz).fit(runs).model_
+        known = dict(zip(plain.layout.names, plain.values.tolist(), strict=True))
+        links = np.array([known.get(name, 0.0) for name in arm.parameter_names])
+        parts = (f"{PARAMETER_OF[part.effect]}{part.joint}" for part in fitted.structure.components)
+        values = [*fitted.structure.base.values(links), *(known.get(name, 0.0) for name in parts)]
+        return TorqueModel(**(vars(fitted) | {"values": np.array(values)}))
+
+
+def fit_yardstick(arm: Arm, observed: Observed) -> Yardstick | None:
+    """None where the stretches that identify are too short."""
+    runs = identification_runs(observed)
+    try:
+        cutoff = choose_cutoff_hz(arm, runs)
+        return Yardstick(fit_plain_rows(arm, [prepare_rows(run, cutoff) for run in runs], cutoff), cutoff)
+    except DataError:
+        return None
+
+
+def squared_errors(arm: Arm, observed: Observed, block: NDArray[np.intp], cutoff_hz: float) -> Array:
+    """Of plain least squares on blocks left out in turn, summed over the rows that identify, (joints,).
+
+    observed, block: the rows that judge, and the block of each. Raises ValueError where no rows are left.
+    """
+    identify = rows_in(observed.of_role("identify"), observed.rows)
+    ends = np.cumsum([0, *(len(each.torque) for each in observed.signals)])
+    prepared = [prepare_rows(each.run, cutoff_hz) for each in observed.signals]
+    own = []  # the block of each row that is fitted, -1 where it does not identify
+    for number, each in enumerate(observed.signals):
+        part = slice(int(ends[number]), int(ends[number + 1]))
+        near = np.clip(np.searchsorted(each.time, prepared[number].time), 0, len(each.time) - 1)
+        own.append(np.where(identify[part][near], block[part][near], -1))
+    errors = np.zeros(observed.joints)
+    for number in np.unique(block[identify]):
+        kept = [rows.where((mine >= 0) & (mine != number)) for rows, mine in zip(prepared, own, strict=True)]
+        model = fit_plain_rows(arm, kept, cutoff_hz)
+        left = Yardstick(model, cutoff_hz).residual(observed)
+        rows = identify & (block == number)
+        errors += np.sum(left[rows] ** 2, axis=0)
+    return errors
+
+
+def predicts_better(one: Array, other: Array, least: float) -> bool:
+    """Whether squared errors (joints,) are smaller than others: their roots by more than a share, as the mean of the
+    joints' logarithms has it.
+    """
+    ratio = np.log(np.maximum(one, 1e-300)) - np.log(np.maximum(other, 1e-300))
+    return bool(np.mean(ratio) / 2 < np.log(1 - least))
+
+
+def with_claims(model: TorqueModel, claimed: Sequence[tuple[str, int | None]]) -> TorqueModel:
+    """The model with the components marked that no finding names. claimed: effects and joints of the findings."""
+    parts = enumerate(model.structure.components)
+    return replace(model, unclaimed=frozenset(at for at, part in parts if (part.effect, part.joint) not in claimed))

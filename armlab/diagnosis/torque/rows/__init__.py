@@ -1,0 +1,1 @@
+"""From a recording to filtered rows, their noise and their features."""

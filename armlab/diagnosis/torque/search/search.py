@@ -1,0 +1,224 @@
+"""The simpler laws that a law contains, and has to be better than."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.torque.columns.columns import Group
+from armlab.diagnosis.torque.columns.links import Widths
+from armlab.diagnosis.torque.columns.solver import Solver, State
+from armlab.diagnosis.tuning import SearchTuning
+
+
+def rival_formulas(groups: Sequence[Group], number: int) -> tuple[int, ...]:
+    """Numbers of the formulas at a joint that a law of the last resort has to be clearly better than."""
+    own = groups[number].candidate
+    return tuple(
+        other
+        for other, each in enumerate(groups)
+        if each.candidate.joint == own.joint
+        and each.candidate.facts.one_of == own.facts.one_of
+        and not each.candidate.facts.last_resort
+    )
+
+
+@dataclass(frozen=True)
+class Step:
+    """One move of the search, for the log."""
+
+    what: str
+    score: float
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Moves that raise the score of a state. fixed: whether the links' widths may not be changed.
+    banned: groups that were withdrawn."""
+
+    solver: Solver
+    settings: Settings
+    fixed: bool
+    links: int
+    banned: frozenset[int] = frozenset()
+
+    @property
+    def tuning(self) -> SearchTuning:
+        """Bounds of the search."""
+        return self.settings.tuning.search
+
+    def best(self, starts: Sequence[State]) -> tuple[State, tuple[Step, ...]]:
+        """The best state that the starts lead to, and the moves of all."""
+        steps: list[Step] = []
+        ends = [self.climb(start, steps) for start in starts]
+        if not self.fixed:
+            crossed = {State(each.groups, other.widths) for each in ends for other in ends} - set(ends)
+            ends += [self.climb(start, steps) for start in sorted(crossed, key=lambda each: each.groups)]
+        return max(ends, key=lambda end: self.solver.fit(end).score), tuple(steps)
+
+    def climb(self, state: State, steps: list[Step]) -> State:
+        """The state where no move raises the score any more."""
+        for _ in range(self.tuning.max_moves):
+            better = self._step(state)
+            if better is None:
+                break
+            what, state = better
+            steps.append(Step(what, self.solver.fit(state).score))
+        return state
+
+    def _step(self, state: State) -> tuple[str, State] | None:
+        here = self.solver.fit(state).score
+        for moves in (self._forward, self._backward, self._widths, self._exchanges):
+            found = [(what, other) for what, other in moves(state)]
+            if not found:
+                continue
+            what, other = max(found, key=lambda move: self.solver.fit(move[1]).score)
+            if self.solver.fit(other).score > here + self.tuning.min_score_step:
+                return what, other
+        return None
+
+    def _forward(self, state: State) -> Iterator[tuple[str, State]]:
+        crowded = self.solver.crowd(state.groups) >= self.tuning.max_unusual_effects
+        added = None if crowded else self._addition(state)
+        if added is not None:
+            yield f"+ {self._name(added)}", self.with_group(state, added)
+
+    def with_group(self, state: State, group: int) -> State:
+        """The state with a group, without those that it replaces, or that break a law of physics at its joint then."""
+        state = self.in_place(state, group)
+        joint = self.solver.groups[group].candidate.joint
+        for other in state.groups:
+            beside = other != group and self.solver.groups[other].candidate.joint == joint
+            if beside and self.objection(state, other) is not None:
+                state = state.minus(other)
+        return state
+
+    def in_place(self, state: State, group: int) -> State:
+        """The state with a group, without those that it replaces."""
+        for other in self._replaced(state, group):
+            state = state.minus(other)
+        return state.plus(group)
+
+    def _replaced(self, state: State, group: int) -> list[int]:
+        return [other for other in state.groups if self.solver.replaces[group, other]]
+
+    def excluded(self, state: State, group: int) -> bool:
+        """Whether a group is not looked for: see `has_no_room`.
+
+        A law of the last resort is nowhere looked for beside the others: see `find_friction_curves`.
+        """
+        return self.solver.groups[group].candidate.facts.last_resort or self.has_no_room(state, group)
+
+    def has_no_room(self, state: State, group: int) -> bool:
+        """Whether the state holds the group's place already, or something that contains it."""
+        candidate = self.solver.groups[group].candidate
+        inside = [self.solver.groups[other] for other in state.groups]
+        return self._too_many_beside(state, group) or any(
+            other.place == self.solver.groups[group].place
+            or (
+                bool(candidate.facts.one_of)
+                and candidate.facts.one_of == other.candidate.facts.one_of
+                and candidate.joint == other.candidate.joint
+            )
+            or (candidate.effect in other.candidate.replaces and candidate.joint == other.candidate.joint)
+            for other in inside
+        )
+
+    def _too_many_beside(self, state: State, group: int) -> bool:
+        """Whether an effect would have more of another beside it than it allows, see `Effect.at_most_beside`."""
+        facts = [self.solver.groups[each].candidate.facts for each in (*state.groups, group)]
+        present = [each.id for each in facts]
+        limits = [limit for each in facts for limit in each.at_most_beside.items()]
+        return any(present.count(effect) > count for effect, count in limits)
+
+    def _addition(self, state: State, but: int | None = None) -> int | None:
+        """The group that raises the score most and breaks no law of physics."""
+        gains = self.gains(state)
+        asked = 0
+        for group in np.argsort(-gains):
+            number = int(group)
+            if gains[number] <= self.tuning.min_score_step or asked >= self.tuning.max_candidates_asked:
+                return None
+            if number == but or number in self.banned or self.excluded(state, number):
+                continue
+            asked += 1
+            if self.objection(self.with_group(state, number), number) is None:
+                return number
+        return None
+
+    def gains(self, state: State) -> Array:
+        """Gain of each group, with the price of what it replaces given back."""
+        solver, present = self.solver, list(state.groups)
+        given_back = solver.prices[present] + solver.tuning.crowd_penalty * solver.unusual[present]
+        return np.asarray(solver.gains(state) + solver.replaces[:, present] @ given_back)
+
+    def objection(self, state: State, group: int) -> str | None:
+        """What physics says against a group as it is fitted in a state."""
+        if not self.settings.guards.physics_signs:
+            return None
+        fit = self.solver.fit(state)
+        return self.solver.objection(group, self.solver.values(fit, group), self.solver.covariance(fit, group))
+
+    def _backward(self, state: State) -> Iterator[tuple[str, State]]:
+        if not self.settings.guards.backward_elimination or not state.groups:
+            return
+        losses = self.solver.losses(self.solver.fit(state))
+        group = max(losses, key=lambda each: losses[each])
+        if losses[group] > 0:
+            yield f"- {self._name(group)}", state.minus(group)
+
+    def _exchanges(self, state: State) -> Iterator[tuple[str, State]]:
+        if not self.settings.guards.backward_elimination:
+            return
+        for group in state.groups:
+            for without in self._without(state, group):
+                added = self._addition(without, group)
+                if added is not None:
+                    yield f"{self._name(group)} -> {self._name(added)}", self.with_group(without, added)
+
+    def _without(self, state: State, group: int) -> list[State]:
+        """The state without a group; with the usual friction that it contained; without the joint's friction at all."""
+        bare, usual = state.minus(group), self.solver.contained(group)
+        back = State(tuple(sorted({*bare.groups, *usual})), state.widths)
+        free, friction = bare, self._usual_friction(state, self.solver.groups[group].candidate.joint)
+        if friction[:1] == [
+            group
+        ]:  # one law may stand for all friction of a joint, and no part alone makes room for it
+            for other in friction[1:]:
+                free = free.minus(other)
+        return list(dict.fromkeys((bare, back, free)))
+
+    def _usual_friction(self, state: State, joint: int | None) -> list[int]:
+        """Groups of a joint's usual friction in a state, in the order of the library."""
+        facts = [(group, self.solver.groups[group].candidate) for group in state.groups]
+        return [group for group, each in facts if each.joint == joint and each.facts.usual and each.facts.dissipates]
+
+    def _widths(self, state: State) -> Iterator[tuple[str, State]]:
+        if self.fixed or state.widths is None:
+            return
+        for widths in self._neighbours(state.widths):
+            yield f"links off by {widths}", State(state.groups, widths)
+
+    def _neighbours(self, widths: Widths) -> Iterator[Widths]:
+        """All links alike, or one link changed."""
+        tried = self.settings.tuning.links
+        yield from ((size,) * self.links for size in (0.0, *tried.uncertainty_grid))
+        for size in (0.0, *tried.single_link_grid):
+            for link in range(self.links):
+                yield tuple(size if other == link else width for other, width in enumerate(widths))
+
+    def _name(self, group: int) -> str:
+        candidate = self.solver.groups[group].candidate
+        where = "" if candidate.joint is None else f" {candidate.joint}"
+        shape = "" if not candidate.shape else f" {tuple(round(value, 4) for value in candidate.shape)}"
+        return f"{candidate.effect}{where}{shape}"
+
+
+def background_state(solver: Solver, widths: Widths | None) -> State:
+    """Friction and offset on every joint."""
+    chosen = [
+        number for number, group in enumerate(solver.groups) if group.candidate.facts.usual and group.variant == 0
+    ]
+    return State(tuple(chosen), widths)

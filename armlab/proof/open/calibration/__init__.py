@@ -1,0 +1,1 @@
+"""Probabilities of names, learnt from judged sets."""

@@ -1,0 +1,1 @@
+"""Public recordings of motion only, and the same fits by another package."""

@@ -1,0 +1,271 @@
+"""Random cases of public recordings: identify, draw, conceal, diagnose and judge; the tables of what came out.
+
+`armlab prove --tier real` scores the tables, and `armlab calibrate --real` learns from the names that were weighed. All
+outcomes are stored, so that an interrupted command continues.
+"""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from joblib import Parallel, delayed
+from pydantic import TypeAdapter
+
+from armlab.common.errors import InputError
+from armlab.common.files import write_texts
+from armlab.common.settings import read_json, suggest_name
+from armlab.proof.open.real_concealed.claims import DrawnVerdict, judge_drawn
+from armlab.proof.open.real_concealed.conceal import Reference, SoughtEffect, identify_reference
+from armlab.proof.open.real_concealed.draw import DrawnCase, draw_cases
+from armlab.proof.open.real_concealed.examine import (
+    OUTCOME_ADAPTER,
+    Outcome,
+    ReportedFinding,
+    diagnose_concealed,
+    open_outcomes,
+    sought_in_case,
+)
+from armlab.proof.open.real_concealed.labels import LabelledFinding, label_weighed
+from armlab.proof.open.real_concealed.observation import read_observation, write_observation
+from armlab.proof.open.real_concealed.plan import Case
+from armlab.proof.open.real_concealed.report import OUTCOMES_FOLDER, finding_in_words, list_findings
+from armlab.proof.open.real_identification.looks import LOOKS_FILE, Looks
+from armlab.proof.open.real_identification.study import recipe_named
+from armlab.recordings.public import open_public_recording
+
+REAL_ARMS = ("emps", "staubli-tx40", "unisa-ur10", "unisa-panda", "kuka-kr300")
+TABLES = ("cases.csv", "claims.csv", "recordings.csv")
+WEIGHED_FILE, WEIGHED_SCHEMA = "weighed.json", "weighed/1"
+CASE_COLUMNS = (
+    "recording",
+    "case",
+    "way",
+    "kind",
+    "concealed",
+    "sought",
+    "strength",
+    "answer",
+    "said",
+    "seconds",
+    "refused",
+)
+CLAIM_COLUMNS = ("recording", "case", "concealed", "strength", "claim", "verdict", "class_size", "probability")
+RECORDING_COLUMNS = ("recording", "reference", "control")
+
+
+@dataclass(frozen=True)
+class RandomCases:
+    """Which recordings, how many cases of each, and the seed. Seeds 1000-1999 are for development."""
+
+    recordings: tuple[str, ...]
+    cases: int
+    seed: int
+
+    def __post_init__(self) -> None:
+        """Raises InputError for an unknown recording."""
+        for name in self.recordings:
+            if name not in REAL_ARMS:
+                raise InputError(f"unknown recording '{name}': {suggest_name(name, list(REAL_ARMS))}")
+
+
+@dataclass(frozen=True, eq=False)
+class RandomStudy:
+    """A recording with its control and the verdicts on its random cases. description: of the reference model.
+
+    labelled: the findings of each case that were weighed.
+    """
+
+    name: str
+    description: str
+    control: Outcome
+    verdicts: tuple[DrawnVerdict, ...]
+    labelled: tuple[tuple[LabelledFinding, ...], ...]
+
+
+@dataclass(frozen=True)
+class RandomTruth:
+    """The answer to a random case. number: from 1 among those of its recording, 0 for the control.
+
+    joints: of the arm. reference: how its model was chosen. sought: what should be named.
+    """
+
+    case: Case
+    number: int
+    joints: int
+    reference: str
+    strength: float
+    sought: tuple[SoughtEffect, ...]
+
+
+OBSERVATIONS, TRUTH, VERDICTS, OUTCOME_FILE = "observations", "truth", "verdicts", "outcome.json"
+
+
+def conceal_at_random(
+    settings: RandomCases,
+    recordings: Path,
+    results: Path,
+    out: Path,
+    jobs: int,
+    progress: Callable[[str], None] = lambda message: None,
+) -> Iterator[str]:
+    """Makes, diagnoses and judges random cases; lines that tell what is done and written.
+
+    recordings: folder of the recordings, which are fetched into it. results: folder of the log of looks. out: folder of
+    the tables. What was diagnosed before an interruption is not diagnosed again.
+    """
+    code = open_outcomes(recordings).code
+    folder = recordings / OUTCOMES_FOLDER / f"random-{settings.seed}-{settings.cases}-{code[:20]}"
+    wanted = {name: [f"{name}-{number}" for number in range(settings.cases + 1)] for name in settings.recordings}
+    new = [name for name, keys in wanted.items() if not all(_truth_file(folder, key).is_file() for key in keys)]
+    yield from make_cases(replace(settings, recordings=tuple(new)), recordings, results, folder, progress)
+    keys = [key for each in wanted.values() for key in each]
+    waiting = [key for key in keys if not (folder / VERDICTS / key / OUTCOME_FILE).is_file()]
+    tasks = (delayed(_examine)(folder / OBSERVATIONS / key, folder / VERDICTS / key) for key in waiting)
+    for number, key in enumerate(Parallel(n_jobs=jobs, return_as="generator_unordered")(tasks), 1):
+        yield f"  diagnosed {number} of {len(waiting)}: {key}"
+    yield from judge_cases(settings, folder, out)
+
+
+def make_cases(
+    settings: RandomCases, recordings: Path, results: Path, folder: Path, progress: Callable[[str], None]
+) -> Iterator[str]:
+    """Writes observations and answers into a folder, the control of each recording first, and diagnoses nothing.
+
+    Each look at the validation runs that their diagnosis will take is logged.
+    """
+    looks = Looks(results / LOOKS_FILE)
+    for name in settings.recordings:
+        progress(f"{name}: the reference model")
+        reference = identify_reference(open_public_recording(name, recordings), recipe_named(name))
+        yield f"{name}: reference {reference.description}"
+        drawn = (DrawnCase(Case(name), 0.0), *draw_cases(reference, settings.seed, settings.cases))
+        for number, each in enumerate(drawn):
+            write_random_case(reference, number, each, folder)
+            for run in reference.recording.with_role("validate"):
+                looks.note(reference.recording.arm.name, run.name, f"concealed: {each.case.name}")
+
+
+def write_random_case(reference: Reference, number: int, drawn: DrawnCase, folder: Path) -> None:
+    """Writes the observation and the answer of a case, the answer last."""
+    key = f"{drawn.case.recording}-{number}"
+    for part in (OBSERVATIONS, TRUTH):
+        (folder / part).mkdir(parents=True, exist_ok=True)
+    write_observation(reference, drawn.case, folder / OBSERVATIONS / key)
+    sought = () if drawn.case.control else sought_in_case(reference, drawn.case)
+    joints = len(reference.recording.arm)
+    truth = RandomTruth(drawn.case, number, joints, reference.description, drawn.strength, sought)
+    _truth_file(folder, key).write_text(json.dumps(asdict(truth), indent=1) + "\n", encoding="utf-8")
+
+
+def _truth_file(folder: Path, key: str) -> Path:
+    return folder / TRUTH / f"{key}.json"
+
+
+def examine_observation(
+    observation: Path, out: Path, progress: Callable[[str], None] = lambda message: None
+) -> Iterator[str]:
+    """Diagnoses the recording of an observation, and writes what is said into a folder."""
+    _, outcome = diagnose_concealed(*read_observation(observation), progress)
+    text = OUTCOME_ADAPTER.dump_json(outcome, indent=1).decode() + "\n"
+    yield from (f"wrote {path}" for path in write_texts({OUTCOME_FILE: text}, out))
+
+
+def _examine(observation: Path, out: Path) -> str:
+    for _ in examine_observation(observation, out):
+        pass
+    return observation.name
+
+
+def judge_cases(settings: RandomCases, folder: Path, out: Path) -> Iterator[str]:
+    """Judges the cases of a folder by their answers, and writes the tables.
+
+    A case without an outcome counts as refused. InputError where a recording has no case there.
+    """
+    read = TypeAdapter(RandomTruth).validate_python
+    answers = {path.stem: read(read_json(path)) for path in sorted((folder / TRUTH).glob("*.json"))}
+    studies = list[RandomStudy]()
+    for name in settings.recordings:
+        own = sorted((each.number, key) for key, each in answers.items() if each.case.recording == name)
+        if not own:
+            raise InputError(f"{folder} holds no case of {name}: name the recordings that it was made of")
+        judged = [(answers[key], _read_outcome(folder / VERDICTS / key)) for _, key in own]
+        control = judged[0][1]
+        if control.refused:
+            yield f"{name} is left out: with nothing concealed it is not diagnosed: {control.refused}"
+        else:
+            studies.append(_judge(name, judged[1:], control))
+    texts = random_tables(studies) | {WEIGHED_FILE: weighed_text(settings, studies)}
+    yield from (f"wrote {path}" for path in write_texts(texts, out))
+
+
+def _read_outcome(folder: Path) -> Outcome:
+    try:
+        return OUTCOME_ADAPTER.validate_json((folder / OUTCOME_FILE).read_bytes())
+    except FileNotFoundError:
+        return Outcome(folder.name, (), (), (), (), (), None, 0.0, "no verdict")
+
+
+def _judge(name: str, judged: Sequence[tuple[RandomTruth, Outcome]], control: Outcome) -> RandomStudy:
+    verdicts = tuple(
+        judge_drawn(DrawnCase(truth.case, truth.strength), outcome, truth.sought, control, truth.joints)
+        for truth, outcome in judged
+    )
+    labelled = tuple(tuple(label_weighed(outcome, truth.sought, control, truth.joints)) for truth, outcome in judged)
+    return RandomStudy(name, judged[0][0].reference, control, verdicts, labelled)
+
+
+def random_tables(studies: Sequence[RandomStudy]) -> dict[str, str]:
+    """The texts of `TABLES`: a row for each thing sought, each new claim, each recording."""
+    numbered = [pair for each in studies for pair in enumerate(each.verdicts, 1)]
+    cases = [row for number, verdict in numbered for row in _case_rows(number, verdict)]
+    claims = [row for number, verdict in numbered for row in _claim_rows(number, verdict)]
+    about = [(each.name, each.description, list_findings(each.control.findings)) for each in studies]
+    frames = (
+        pd.DataFrame(cases, columns=list(CASE_COLUMNS)),
+        pd.DataFrame(claims, columns=list(CLAIM_COLUMNS)),
+        pd.DataFrame(about, columns=list(RECORDING_COLUMNS)),
+    )
+    return {
+        name: frame.to_csv(index=False, float_format="%.4g", lineterminator="\n")
+        for name, frame in zip(TABLES, frames, strict=True)
+    }
+
+
+def weighed_text(settings: RandomCases, studies: Sequence[RandomStudy]) -> str:
+    """The names that were weighed for each finding of each case, and which of them are right."""
+    findings = [
+        {"recording": study.name, "case": number, **asdict(each)}
+        for study in studies
+        for number, labelled in enumerate(study.labelled, 1)
+        for each in labelled
+    ]
+    return json.dumps({"schema": WEIGHED_SCHEMA, "seed": settings.seed, "findings": findings}) + "\n"
+
+
+def _case_rows(number: int, verdict: DrawnVerdict) -> Iterator[tuple[Any, ...]]:
+    case, outcome = verdict.drawn.case, verdict.outcome
+    way, kind = ("withheld", case.withheld[0].kind) if case.injected is None else ("injected", case.injected.effect)
+    said = "; ".join(_claim_in_words(each.finding) for each in verdict.claims)
+    about = case.recording, number, way, kind.replace("_", " "), case.name
+    for part in verdict.parts:
+        judged = part.sought.label, verdict.drawn.strength, part.answer, said
+        yield (*about, *judged, outcome.seconds, outcome.refused)
+
+
+def _claim_rows(number: int, verdict: DrawnVerdict) -> Iterator[tuple[Any, ...]]:
+    case = verdict.drawn.case
+    for each in verdict.claims:
+        claim = finding_in_words(each.finding), each.verdict, each.class_size, each.probability
+        yield (case.recording, number, case.name, verdict.drawn.strength, *claim)
+
+
+def _claim_in_words(finding: ReportedFinding) -> str:
+    """A claim with the probability of its name, and what else it may be."""
+    words = finding_in_words(finding)
+    if finding.probability is not None:
+        words += f" ({finding.probability:.2f})"
+    others = [each.effect.replace("_", " ") for each in finding.members if each.effect != finding.effect]
+    return f"{words} or {', '.join(others)}" if others else words

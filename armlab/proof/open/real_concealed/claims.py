@@ -1,0 +1,145 @@
+"""Judges the claims of a random case: each claim that is new against the control, and each thing that was sought."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from armlab.effects.contract import UNKNOWN
+from armlab.effects.library import EFFECT_IDS, effect_named
+from armlab.proof.open.real_concealed.conceal import SoughtEffect
+from armlab.proof.open.real_concealed.draw import DrawnCase
+from armlab.proof.open.real_concealed.examine import Outcome, ReportedFinding
+from armlab.proof.open.real_concealed.judge import Findings, Judge, is_same_kind
+
+ClaimVerdict = Literal["right", "class", "law", "unknown", "wrong"]
+SoughtAnswer = Literal["named", "class", "law", "cancelled", "absorbed", "unknown", "another name", "missed"]
+MAX_CLASS_SIZE = 4  # names of a class that counts as an answer
+Name = tuple[str, tuple[int, ...]]  # effect and joints
+
+
+@dataclass(frozen=True)
+class JudgedClaim:
+    """A claim that the control does not make.
+
+    verdict: right where its first name is sought, or is one that no motion separates from it; class where another name
+    of its class of four at most is; law for another law of friction where friction is withheld, which is neither right
+    nor wrong; unknown without a name; wrong otherwise. probability: of its first name together with those that no
+    motion separates from it.
+    """
+
+    finding: ReportedFinding
+    verdict: ClaimVerdict
+    class_size: int
+    probability: float | None
+
+
+@dataclass(frozen=True)
+class AnsweredPart:
+    """One thing that was sought, and what the new claims say of it.
+
+    answer: named, class and law as in `JudgedClaim`; cancelled where it only takes away what the control names;
+    absorbed where a law that the control names there holds it as a part, and has other numbers now; unknown or another
+    name at its joint (its name at another joint counts as another name); missed without any.
+    """
+
+    sought: SoughtEffect
+    answer: SoughtAnswer
+
+
+@dataclass(frozen=True)
+class DrawnVerdict:
+    """A random case with its new claims and what was sought."""
+
+    drawn: DrawnCase
+    outcome: Outcome
+    claims: tuple[JudgedClaim, ...]
+    parts: tuple[AnsweredPart, ...]
+
+
+def judge_drawn(
+    drawn: DrawnCase, outcome: Outcome, wanted: tuple[SoughtEffect, ...], control: Outcome, joints: int
+) -> DrawnVerdict:
+    """Judges a case. wanted: what is concealed. joints: of the arm."""
+    judge = Judge(control, joints)
+    new = tuple(each for each in outcome.findings if _is_new(judge, each, wanted))
+    claims = tuple(_judged_claim(judge, each, wanted) for each in new)
+    parts = tuple(AnsweredPart(each, _answer(judge, each, outcome.findings, claims)) for each in wanted)
+    return DrawnVerdict(drawn, outcome, claims, parts)
+
+
+def _is_new(judge: Judge, finding: ReportedFinding, wanted: tuple[SoughtEffect, ...]) -> bool:
+    """Whether the control does not name the effect there; of what is sought, whether it does not name that size."""
+    if any(judge.answers(finding, each) or is_same_kind(finding, each) for each in wanted):
+        return not judge.is_in_control(finding)
+    return not judge.findings_in_control(finding)
+
+
+def _judged_claim(judge: Judge, finding: ReportedFinding, wanted: tuple[SoughtEffect, ...]) -> JudgedClaim:
+    size, chance = len(_class_names(judge, finding)), finding.probability
+    own = judge.common_key(finding.effect, finding.joints)
+    alike = [each for each in finding.members if judge.common_key(each.effect, each.joints) == own]
+    if chance is not None and finding.effect != UNKNOWN.id:
+        chance = max(chance, sum(each.probability for each in alike))
+    return JudgedClaim(finding, _claim_verdict(judge, finding, wanted), size, chance)
+
+
+def _claim_verdict(judge: Judge, finding: ReportedFinding, wanted: tuple[SoughtEffect, ...]) -> ClaimVerdict:
+    """The verdict on one new claim."""
+    if finding.effect == UNKNOWN.id:
+        return "unknown"
+    if any(judge.answers(finding, each) for each in wanted):
+        return "right"
+    if any(is_same_kind(finding, each) for each in wanted):
+        return "law"
+    return "class" if any(_is_in_class(judge, finding, each) for each in wanted) else "wrong"
+
+
+def _class_names(judge: Judge, finding: ReportedFinding) -> set[Name]:
+    """The names that a finding leaves open, its own included; those that nothing separates count once."""
+    if finding.effect == UNKNOWN.id:
+        return {(UNKNOWN.id, finding.joints)}
+    names = [(finding.effect, finding.joints)]
+    names += [(each.effect, each.joints) for each in finding.rivals]
+    names += [(each.effect, each.joints) for each in finding.members]
+    return {judge.common_key(*each) for each in names}
+
+
+def _is_in_class(judge: Judge, finding: ReportedFinding, sought: SoughtEffect) -> bool:
+    """Whether a class of four names at most holds one that is sought, at the place."""
+    names = _class_names(judge, finding)
+    return len(names) <= MAX_CLASS_SIZE and not names.isdisjoint(judge.common_keys(sought))
+
+
+def _answer(judge: Judge, sought: SoughtEffect, findings: Findings, claims: tuple[JudgedClaim, ...]) -> SoughtAnswer:
+    """The best answer of the new claims to one thing. findings: all of the case."""
+    names = [each.finding for each in claims if each.verdict != "unknown"]
+    if any(judge.answers(each, sought) for each in names):
+        return "named"
+    if any(is_same_kind(each, sought) for each in names):
+        return "law"
+    if any(_is_in_class(judge, each, sought) for each in names):
+        return "class"
+    if judge.is_cancelled(sought, findings):
+        return "cancelled"
+    if any(_absorbs(judge, each, sought) for each in findings):
+        return "absorbed"
+    wrong = [each.finding for each in claims if each.verdict == "wrong"]
+    unknown = [each.finding for each in claims if each.verdict == "unknown"]
+    if any(_is_there(each, sought) or each.effect in (*sought.effects, *sought.identical) for each in wrong):
+        return "another name"
+    return "unknown" if any(_is_there(each, sought) for each in unknown) else "missed"
+
+
+MORE_PARTS = {"asymmetric_friction": ("torque_offset",)}  # Coulomb friction that differs by direction, and an offset
+
+
+def _absorbs(judge: Judge, finding: ReportedFinding, sought: SoughtEffect) -> bool:
+    """Whether the law of a finding holds what is sought as a part, and the control names it with other numbers."""
+    if finding.joints != sought.joints or finding.effect not in EFFECT_IDS or not judge.findings_in_control(finding):
+        return False
+    parts = (*effect_named(finding.effect).contains, *MORE_PARTS.get(finding.effect, ()))
+    return set(sought.effects) <= set(parts) and not judge.is_in_control(finding)
+
+
+def _is_there(finding: ReportedFinding, sought: SoughtEffect) -> bool:
+    """Whether a finding is at the joint of what is sought; all joints are there for a delay of the whole arm."""
+    return not sought.joints or finding.joints[:1] == sought.joints[:1]

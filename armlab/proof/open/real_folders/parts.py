@@ -1,0 +1,57 @@
+"""The two parts of `armlab real`: recording folders, which are asked most, and the public recordings."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from armlab.common.errors import InputError
+from armlab.common.settings import suggest_name
+from armlab.proof.open.real_arms.bench import bench_real_arms
+from armlab.proof.open.real_folders.bench import FolderBench, bench_folders
+from armlab.proof.open.real_identification.study import RECIPES
+from armlab.recordings.public import LOCAL_COPIES_VARIABLE
+
+
+@dataclass(frozen=True)
+class PublicBench:
+    """Where the public recordings and their results are; fields as in `bench_real_arms`."""
+
+    results: Path
+    recordings: Path
+    peers: Path | None
+
+
+def bench_real(
+    folders: FolderBench | None,
+    public: PublicBench | None,
+    only: Sequence[str] = (),
+    progress: Callable[[str], None] = lambda message: None,
+) -> Iterator[str]:
+    """Lines of one part or of both; `only` names recordings, and a part without one of them is left out.
+
+    Folders are left out with a line, too, where there are none and nothing is asked of them alone.
+    Raises InputError for a name that is in no part.
+    """
+    optional = public is not None and folders is not None and folders.facts is None
+    own = () if folders is None else _folder_names(folders, optional)
+    arms = () if public is None else tuple(recipe.name for recipe in RECIPES)
+    for name in only:
+        if name not in own and name not in arms:
+            raise InputError(f"unknown recording '{name}': {suggest_name(name, [*own, *arms])}")
+    if folders is not None and not own:
+        yield f"no recording folders: {LOCAL_COPIES_VARIABLE} names none"
+    elif folders is not None and (not only or set(only) & set(own)):
+        yield from bench_folders(folders, [name for name in only if name in own])
+    if public is not None and (not only or set(only) & set(arms)):
+        chosen = [name for name in only if name in arms]
+        yield from bench_real_arms(public.results, public.recordings, chosen, public.peers, progress)
+
+
+def _folder_names(folders: FolderBench, optional: bool) -> tuple[str, ...]:
+    """Names of the folders; none where there are none and they are `optional`, else InputError."""
+    try:
+        return tuple(each.name for each in folders.find())
+    except InputError:
+        if optional:
+            return ()
+        raise

@@ -1,0 +1,190 @@
+"""What a reading mistake has to explain: a bound learnt on recordings of real arms that are read rightly.
+
+On each of them the best wrong reading explains something by chance, its evidence (`Judge.evidence`). The bound is the
+one-sided prediction limit of these best evidences for one more arm (Hahn and Meeker 1991, section 4.8),
+
+    bound = mean + t(1 - chance, arms - 1) sd sqrt(1 + 1 / arms).
+
+All recordings of an arm count once, by the largest of them. The other class are mistakes: each reading that was tried
+is taken for the right one in turn, and what the recording as it is explains beyond it is the evidence for this mistake.
+"""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import t as student
+
+from armlab.common.errors import DataError, InputError
+from armlab.common.files import write_texts
+from armlab.common.markdown import markdown_page, markdown_table
+from armlab.diagnosis.torque.rows.simulation import read_simulation
+from armlab.proof.open.likeness.real_arms import RealFolder
+from armlab.recordings.load import load_recording
+from armlab.recordings.motion import is_motion_only
+from armlab.recordings.reading.answer import read_rightly
+from armlab.recordings.reading.judge import Judge, Trial
+from armlab.recordings.reading.reading import SPRING, read_as_is
+from armlab.recordings.reading.singles import search_singles
+from armlab.recordings.reading.tuning import BOUND_FILE, BOUND_SCHEMA, ReadingTuning
+from armlab.recordings.recording import Recording
+
+CHANCE = 0.01  # of a wrong reading on one more arm
+JUDGED = 25  # readings of a recording, the likeliest ones, that are judged by their evidence
+MISTAKES = 30  # readings of a recording, spread over all that were tried, that are taken for the right one
+SEEN_RATIO = 1.5  # of a joint's error with a mistake to that without: less is not seen
+DIGITS = 3
+PAGE_FILE = "reading_bound.md"
+
+
+@dataclass(frozen=True)
+class WrongReading:
+    """The best wrong reading of a recording. folder: where it is; name: of the mistake that it would be.
+
+    evidence: nats. mistakes: evidence for mistakes that can be seen, were they there.
+    """
+
+    folder: RealFolder
+    name: str
+    evidence: float
+    mistakes: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class ArmVerdict:
+    """An arm judged without itself. nearest: its best wrong reading; bound: learnt on the others.
+
+    named, named_without: mistakes that its recordings are said to have with the bound of all arms, and with this one.
+    """
+
+    arm: str
+    licensed: bool
+    nearest: WrongReading
+    bound: float
+    named: tuple[str, ...]
+    named_without: tuple[str, ...]
+
+
+def best_wrong_readings(folders: Sequence[RealFolder], tuning: ReadingTuning) -> Iterator[WrongReading]:
+    """The best wrong reading of each recording with torque that is compared with links, and can be judged."""
+    for folder in folders:
+        recording = _recording(folder)
+        judge = None if recording is None else Judge.of(recording, tuning)
+        if recording is not None and judge is not None:
+            yield _best_wrong_reading(folder, recording, judge)
+
+
+def _recording(folder: RealFolder) -> Recording | None:
+    if is_motion_only(folder.path):
+        return None
+    try:
+        recording = load_recording(folder.path)
+    except (InputError, DataError):
+        return None
+    return None if read_simulation(recording, None).kind == "simulated" else recording
+
+
+def _best_wrong_reading(folder: RealFolder, recording: Recording, judge: Judge) -> WrongReading:
+    start = judge.trial(read_as_is(recording, read_simulation(recording, None).inertial))
+    tried = [each for each in search_singles(judge, start) if each.reading.mistakes[-1].effect != SPRING]
+    falling = [each for each in tried[:JUDGED] if judge.may_explain(start, each, each.reading.mistakes[-1], 0.0)]
+    judged = [(judge.evidence(start, each, each.reading.mistakes[-1]), each) for each in falling or tried[:1]]
+    evidence, best = max(judged, key=lambda pair: pair[0])
+    spread = tried[:: max(len(tried) // MISTAKES, 1)]
+    mistakes = [
+        judge.evidence(each, start, each.reading.mistakes[-1]) for each in spread if _is_seen(judge, each, start)
+    ]
+    return WrongReading(folder, best.reading.mistakes[-1].label, evidence, tuple(mistakes))
+
+
+def _is_seen(judge: Judge, wrong: Trial, right: Trial) -> bool:
+    """Whether a mistake makes the error of a joint so much larger than it is, or than what is usual."""
+    pairs = zip(judge.errors(wrong.reading), judge.errors(right.reading), strict=True)
+    usual = judge.tuning.usual_error
+    return any(np.max(before.errors / np.maximum(after.errors, usual)) >= SEEN_RATIO for before, after in pairs)
+
+
+def bound_of(readings: Sequence[WrongReading]) -> float:
+    """The prediction limit of the best evidence of one more arm, nats. Raises InputError for less than three arms."""
+    arms = {each.folder.arm for each in readings}
+    if len(arms) < 3:
+        raise InputError(f"recordings of {len(arms)} arms: a bound needs those of three arms or more")
+    best = np.array([max(each.evidence for each in readings if each.folder.arm == arm) for arm in sorted(arms)])
+    spread = np.std(best, ddof=1) * np.sqrt(1 + 1 / len(best))
+    return round(float(np.mean(best) + student.ppf(1 - CHANCE, len(best) - 1) * spread), DIGITS)
+
+
+def leave_each_arm_out(readings: Sequence[WrongReading], tuning: ReadingTuning) -> Iterator[ArmVerdict]:
+    """The verdict of each arm with the bound of all, and with that of the other arms."""
+    bound = bound_of(readings)
+    for arm in sorted({each.folder.arm for each in readings}):
+        own = [each for each in readings if each.folder.arm == arm]
+        without = bound_of([each for each in readings if each.folder.arm != arm])
+        named = [tuple(_named(own, replace(tuning, least_evidence=each))) for each in (bound, without)]
+        licensed = all(each.folder.licensed for each in own)
+        yield ArmVerdict(arm, licensed, max(own, key=lambda each: each.evidence), without, named[0], named[1])
+
+
+def _named(readings: Sequence[WrongReading], tuning: ReadingTuning) -> Iterator[str]:
+    for each in readings:
+        recording = load_recording(each.folder.path)
+        answer = read_rightly(recording, read_simulation(recording, None).inertial, tuning)
+        yield from (f"{each.folder.name}: {finding.mistake.label}" for finding in answer.findings)
+
+
+def share_told(readings: Sequence[WrongReading], bound: float) -> tuple[int, int]:
+    """How many mistakes that can be seen have so much evidence, and how many there are."""
+    evidence = [value for each in readings for value in each.mistakes]
+    return sum(value >= bound for value in evidence), len(evidence)
+
+
+def bound_lines(verdicts: Sequence[ArmVerdict], bound: float) -> list[str]:
+    """An arm a line: its best wrong reading, and what is said with the bound of all arms and that of the others."""
+    return [
+        f"{each.arm}: best wrong reading {each.nearest.name} ({each.nearest.folder.name}), evidence "
+        f"{each.nearest.evidence:.2f} of {bound:.2f}, of {each.bound:.2f} without this arm; "
+        f"said {', '.join(each.named) or 'nothing'}, without this arm {', '.join(each.named_without) or 'nothing'}"
+        for each in verdicts
+    ]
+
+
+def write_bound(readings: Sequence[WrongReading], verdicts: Sequence[ArmVerdict], out: Path) -> tuple[Path, ...]:
+    """Writes the bound, which the reading uses, and a page about it: of arms whose recordings have a licence."""
+    bound, (told, count) = bound_of(readings), share_told(readings, bound_of(readings))
+    content = {
+        "schema": BOUND_SCHEMA,
+        "recordings": len(readings),
+        "arms": len(verdicts),
+        "chance": CHANCE,
+        "mistakes_told": told,
+        "mistakes_seen": count,
+        "bound": bound,
+    }
+    hidden = sum(not each.licensed for each in verdicts)
+    page = markdown_page(
+        "What a reading mistake has to explain",
+        f"From {len(readings)} recordings of {len(verdicts)} real arms, read rightly: the best wrong reading of one "
+        f"more arm explains more than {bound:.2f} nats with a probability of {CHANCE:.0%}. Of {count} mistakes that "
+        f"can be seen, were they there, {told} explain as much.",
+        f"Each arm with the bound that the others make, all but {hidden} whose recordings have no licence:",
+        markdown_table(
+            ("arm", "best wrong reading", "evidence", "bound without it", "share", "said", "said without it"),
+            [
+                (
+                    each.arm,
+                    each.nearest.name,
+                    f"{each.nearest.evidence:.2f}",
+                    f"{each.bound:.2f}",
+                    f"{each.nearest.evidence / each.bound:.2f}",
+                    ", ".join(each.named) or "nothing",
+                    ", ".join(each.named_without) or "nothing",
+                )
+                for each in verdicts
+                if each.licensed
+            ],
+            numbers=(2, 3, 4),
+        ),
+    )
+    return write_texts({BOUND_FILE: json.dumps(content, indent=1) + "\n", PAGE_FILE: page}, out)

@@ -1,0 +1,1 @@
+"""What people read: summaries, pages and pictures of the engines below, and the files beside them."""

@@ -1,0 +1,1 @@
+"""What is said of recordings that are compared."""

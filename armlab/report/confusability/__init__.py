@@ -1,0 +1,1 @@
+"""The card of a planned motion as a page."""

@@ -1,0 +1,1 @@
+"""What is said of recordings of motion only."""

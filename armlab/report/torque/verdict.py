@@ -1,0 +1,226 @@
+"""The verdict for a reader in a hurry: the first screen of the page, and the lines for the terminal."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from textwrap import wrap
+
+from armlab.common.report.wording import count_of, format_number
+from armlab.diagnosis.result import Claim, Diagnosis, JointFit
+from armlab.diagnosis.torque.names.findings import FRICTION
+from armlab.diagnosis.torque.rows.simulation import Simulation
+from armlab.effects.links import PAYLOAD_FACTS
+from armlab.recordings.reading.answer import SetupFinding
+from armlab.report.told.steps import next_steps
+from armlab.report.told.summary import physics_in_words, sentences_of, shorter_list
+from armlab.report.told.told import Told, ToldFinding, finding_errors, tell
+from armlab.report.torque.measured import NOTHING, doubt_in_words, friction_cell
+from armlab.report.torque.residuals import select_residuals
+from armlab.report.torque.sentences import claim_figures, model_in_words, simulated_figures
+from armlab.report.words import (
+    claim_name,
+    effect_in_words,
+    finding_in_words,
+    format_gap,
+    format_growth,
+    format_probability,
+    format_share,
+    is_excess,
+    is_of_unknown_links,
+    joint_unit,
+    rival_in_words,
+    shorten_name,
+    statement_in_words,
+    variables_in_words,
+)
+from problem.arm import Arm
+from problem.joint_words import joint_in_table, joint_in_words
+
+
+def verdict_sentences(diagnosis: Diagnosis) -> tuple[str, str]:
+    """The first sentence of the verdict, and the others: of a recording that is read wrongly, that first."""
+    setup = diagnosis.setup.sentence if diagnosis.setup else ""
+    if setup:
+        return setup, physics_in_words(diagnosis)
+    if diagnosis.status == "inconclusive":
+        return "These recordings allow no verdict.", physics_in_words(diagnosis)
+    if not diagnosis.fit:  # physics was not asked
+        return physics_in_words(diagnosis), ""
+    if diagnosis.status == "none":
+        worst, simulation = max(diagnosis.fit, key=lambda each: each.after), diagnosis.simulation
+        size = _largest_error_text(worst, simulation.arm)
+        left = f"The largest error on held-out data is {size}." if size else ""
+        return f"Nothing is missing: {model_in_words(simulation)} explains the recordings down to their noise.", left
+    first, *others = sentences_of(diagnosis)
+    return first, " ".join(others)
+
+
+@dataclass(frozen=True)
+class FirstScreen:
+    """What a reader sees first: a headline, and paragraphs below it."""
+
+    headline: str
+    paragraphs: tuple[str, ...]
+
+
+def first_screen(diagnosis: Diagnosis) -> FirstScreen:
+    """A mistake of the reading first, else where the error comes from, else the verdict itself."""
+    first, second = verdict_sentences(diagnosis)
+    setup = diagnosis.setup.sentence if diagnosis.setup else ""
+    if setup and diagnosis.claims:
+        second = f"Of the recording read rightly: {second[0].lower()}{second[1:]}"
+    return FirstScreen(first, (second,) if second else ())
+
+
+def _largest_error_text(worst: JointFit, arm: Arm) -> str:
+    size = joint_unit(arm, worst.joint - 1)
+    where, noise = joint_in_words(arm, worst.joint), format_number(worst.noise_floor)
+    return f"{format_number(worst.after)} {size} ({where}, noise {noise} {size})"
+
+
+LINE_WIDTH = 110  # letters in a line of the terminal
+MAX_WARNINGS = 3  # lines; all of them are on the page
+MIN_CELL, MAX_CELL_LINES = 24, 2  # letters and lines of the last column; all is on the page and with --verbose
+
+
+def verdict_lines(diagnosis: Diagnosis, verbose: bool = False) -> Iterator[str]:
+    """The verdict, how the recording is to be read, what differs at each joint, and what to do next.
+
+    verbose: every finding with its evidence, what is left, and the errors of each joint, too.
+    """
+    first, second = verdict_sentences(diagnosis)
+    arm, told = diagnosis.simulation.arm, tell(diagnosis)
+    yield from wrap(f"{diagnosis.status.upper()}: {first} {second}", LINE_WIDTH)
+    signs = [each for each in diagnosis.signs if each.severity != "note"]
+    warnings = [f"  {line}" for sign in signs for line in wrap(f"warning: {sign.text}", LINE_WIDTH - 2)]
+    yield from warnings if verbose or len(warnings) <= MAX_WARNINGS else warnings[: MAX_WARNINGS - 1]
+    if not verbose and len(warnings) > MAX_WARNINGS:
+        yield f"  more warnings: --verbose, or the page ({count_of(len(signs), 'warning')})"
+    setup = diagnosis.setup.findings if diagnosis.setup else ()
+    for number, mistake in enumerate(setup, 1):
+        yield from _setup_lines(number, mistake, arm)
+    if diagnosis.claims:
+        yield from _joint_lines(diagnosis, told)
+    if told.minor:
+        yield f"  {count_of(len(told.minor), 'small difference')} more, in verdict.json and folded on the page"
+    if diagnosis.is_plain:
+        yield "  model.yaml holds plain least squares: it predicts blocks of these runs better than the named effects"
+    for number, step in enumerate(next_steps(diagnosis, told), 1):
+        yield from (f"  {line}" for line in wrap(f"next {number}: {step}", LINE_WIDTH - 2))
+    if verbose:
+        yield from _detail_lines(diagnosis, told)
+
+
+def _joint_lines(diagnosis: Diagnosis, told: Told) -> Iterator[str]:
+    """A row a joint: all its friction, what was found by name, and what is left of the torque."""
+    arm, joints = diagnosis.simulation.arm, range(1, len(diagnosis.simulation.arm) + 1)
+    rows = [["joint", "friction", "left", "found"]]
+    for joint in joints:
+        own = [each for each in told.findings if each.claim.joint == joint]
+        name = shorten_name(joint_in_table(arm, joint))
+        left = next((f"{100 * each.share_of_torque:.0f} %" for each in told.left if each.joint == joint), NOTHING)
+        rows.append([name, friction_cell(told, joint, arm), left, _found_in_words(own, diagnosis.simulation)])
+    whole = [each for each in told.findings if each.claim.joint is None]
+    if whole:
+        rows.append(["robot", NOTHING, NOTHING, _found_in_words(whole, diagnosis.simulation)])
+    rows = [[cell.replace("\N{NO-BREAK SPACE}", " ") for cell in row] for row in rows]
+    widths = [max(len(row[column]) for row in rows) for column in range(3)]
+    for row in rows:
+        start = "  ".join(cell.ljust(width) for cell, width in zip(row[:3], widths, strict=True)) + "  "
+        lines = wrap(row[3], max(LINE_WIDTH - len(start) - 2, MIN_CELL)) or [NOTHING]
+        if len(lines) > MAX_CELL_LINES:
+            lines = [*lines[: MAX_CELL_LINES - 1], f"{lines[MAX_CELL_LINES - 1].rstrip(';,')} …"]
+        yield f"  {start}{lines[0]}"
+        yield from (f"  {' ' * len(start)}{line}" for line in lines[1:])
+
+
+def _found_in_words(found: Sequence[ToldFinding], simulation: Simulation) -> str:
+    """`Coulomb and viscous friction; torque offset 0.84 N m`: friction stands beside it with its size."""
+    laws = [each for each in found if each.cause == FRICTION and each.statement.kind == "name"]
+    laws = [each for each in laws if not each.claim.simulated]
+    words = [shorter_list([effect_in_words(each.claim.effect) for each in laws])] if laws else []
+    for each in found:
+        if each.cause == FRICTION and each not in laws and not each.claim.simulated:
+            words.append(f"{effect_in_words(each.claim.effect)}{doubt_in_words(each)}")
+        elif each not in laws:
+            numbers = claim_figures(_shorter(each.claim), simulation)
+            links = " of the links, which is not certain" if is_of_unknown_links(each.claim) else ""
+            present, size = simulated_figures(each.claim), f" {numbers}" if numbers else ""
+            if present:
+                size = (
+                    f", {numbers.split(' ')[0]} of {present}" if is_excess(each.claim) else f"{size} beyond {present}"
+                )
+            words.append(f"{claim_name(each.claim)}{links}{size}{doubt_in_words(each)}")
+    return "; ".join(words)
+
+
+def _shorter(claim: Claim) -> Claim:
+    """A finding whose numbers have no intervals; what the simulation has too much of, by how much."""
+    sign = -1.0 if is_excess(claim) else 1.0
+    numbers = (
+        replace(one, interval=None, value=sign * one.value if isinstance(one.value, float) else one.value)
+        for one in claim.parameters
+    )
+    return replace(claim, parameters=tuple(numbers))
+
+
+def _detail_lines(diagnosis: Diagnosis, told: Told) -> Iterator[str]:
+    for number, each in enumerate((*told.findings, *told.minor), 1):
+        yield from _finding_lines(number, each, diagnosis.simulation)
+    arm = diagnosis.simulation.arm
+    for left in told.left:
+        depends = f", depends on {variables_in_words(arm, left.depends_on)}" if left.depends_on else ""
+        usual = "" if left.usual else ", more than real arms leave"
+        yield f"  left at {joint_in_words(arm, left.joint)}: {left.share_of_torque:.1%} of the torque{depends}{usual}"
+    yield from _error_lines(diagnosis)
+
+
+def _error_lines(diagnosis: Diagnosis) -> Iterator[str]:
+    """The table of held-out errors, with the number of each joint that the equations have."""
+    fits, arm, data = diagnosis.fit, diagnosis.simulation.arm, select_residuals(diagnosis)
+    if not fits:
+        return
+    given = None if data is None or data.given is None else data.held_out_rms(data.given).tolist()
+    first = "" if given is None else f"{'as given':>11}"
+    filtered = "" if data is None else f" of torque {data.filtered}"
+    names = [shorten_name(joint_in_table(arm, fit.joint).replace("\N{NO-BREAK SPACE}", " ")) for fit in fits]
+    width = max(len("joint"), *map(len, names))
+    yield f"  errors on held-out data, rms{filtered}:"
+    yield f"  {'joint':<{width}}{first}   refitted      plain      found      noise   gap closed"
+    for name, fit in zip(names, fits, strict=True):
+        closed = format_gap(fit.gap_closed)
+        plain = float("nan") if fit.plain is None else fit.plain
+        values = [*([] if given is None else [given[fit.joint - 1]]), fit.before, plain, fit.after, fit.noise_floor]
+        errors = "".join(f"{format_number(value):>11}" for value in values)
+        yield f"  {name:<{width}}{errors}{closed:>13}   {joint_unit(arm, fit.joint - 1)}"
+
+
+def _setup_lines(number: int, finding: SetupFinding, arm: Arm) -> Iterator[str]:
+    lines = wrap(f"setup: {finding.text}", LINE_WIDTH - 5)
+    yield f"{number:>3}. {lines[0]}"
+    yield from (f"     {line}" for line in lines[1:])
+    unit = joint_unit(arm, finding.worst_joint - 1)
+    error = f"{format_number(finding.rms_before)} to {format_number(finding.rms_after)} {unit}"
+    yield f"     held-out error of {joint_in_words(arm, finding.worst_joint)}: {error}"
+    for rival in finding.rivals:
+        yield from (f"     {line}" for line in wrap(f"fits as well: {rival.text}", LINE_WIDTH - 5))
+    if finding.next_experiment:
+        yield from (f"     {line}" for line in wrap(f"to tell: {finding.next_experiment}", LINE_WIDTH - 5))
+
+
+def _finding_lines(number: int, finding: ToldFinding, simulation: Simulation) -> Iterator[str]:
+    claim, arm = finding.claim, simulation.arm
+    law = claim_figures(claim, simulation) if claim.effect == PAYLOAD_FACTS.id else claim.equation
+    present = simulated_figures(claim)
+    law = f"{law}; the simulation has {present}" if present else law
+    small = "small: " if claim.minor else ""
+    lines = wrap(f"{small}{finding_in_words(arm, claim)}: {law}", LINE_WIDTH - 5)
+    yield f"{number:>3}. {lines[0]}"
+    yield from (f"     {line}" for line in lines[1:])
+    where = joint_in_words(arm, (claim.removal or claim.evidence).joint + 1)
+    growth, probability = format_growth(*finding_errors(claim)), format_probability(claim.evidence.corrected)
+    gain = f"{format_share(finding.share)} of the error; without it the held-out error of {where} is {growth}"
+    whole = f"{gain}; p {probability}; {statement_in_words(finding.statement)}"
+    yield from (f"     {line}" for line in wrap(whole, LINE_WIDTH - 5))
+    same = ", ".join(rival_in_words(arm, each) for each in claim.rivals if each.identical)
+    if same:
+        yield from (f"     {line}" for line in wrap(f"no such motion tells it from {same}", LINE_WIDTH - 5))

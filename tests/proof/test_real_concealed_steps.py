@@ -1,0 +1,97 @@
+"""Random cases of a real recording in steps of their own: made as files, diagnosed from them, judged by the answers."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+from told_recordings import frame, recording_in
+from told_reference import reference_in
+
+from armlab.cli.main import main
+from armlab.common.errors import InputError
+from armlab.proof.open.real_concealed import at_random
+from armlab.proof.open.real_concealed.at_random import RandomCases, conceal_at_random, judge_cases
+from armlab.proof.open.real_concealed.conceal import Reference
+from armlab.proof.open.real_concealed.examine import conceal_case
+from armlab.proof.open.real_concealed.observation import read_observation, write_observation
+from armlab.proof.open.real_concealed.plan import Case, Disturbance, Piece
+from armlab.proof.open.real_identification.looks import LOOKS_FILE
+
+CASES = (
+    Case("told"),
+    Case("told", (Piece("friction", 2),)),
+    Case("told", (), Disturbance("time_delay", None, 0.01, "s")),
+)
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> Reference:
+    return reference_in(tmp_path_factory.mktemp("recordings") / "told")
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_an_observation_is_to_the_bit_what_a_diagnosis_gets_in_memory(
+    reference: Reference, case: Case, tmp_path: Path
+) -> None:
+    wanted, _ = conceal_case(reference, case, tmp_path / "model.yaml")
+    write_observation(reference, case, tmp_path / "seen")
+    seen, source = read_observation(tmp_path / "seen")
+    assert source == "told"
+    assert (seen.findings, seen.arm.name, seen.sample_rate_hz) == (wanted.findings, wanted.arm.name, None)
+    for own, other in zip(seen.runs, wanted.runs, strict=True):
+        assert (own.name, own.role, own.findings, own.signals.keys()) == (
+            other.name,
+            other.role,
+            other.findings,
+            other.signals.keys(),
+        )
+        for name in ("time", *own.signals):
+            np.testing.assert_array_equal(getattr(own, name), getattr(other, name))
+    assert seen.simulation is not None
+    assert seen.simulation.read_text() == (tmp_path / "model.yaml").read_text()
+
+
+def test_an_observation_holds_neither_the_public_runs_nor_what_is_concealed(
+    reference: Reference, tmp_path: Path
+) -> None:
+    write_observation(reference, CASES[2], tmp_path / "seen")
+    files = {path.name for path in (tmp_path / "seen").iterdir()}
+    assert files == {"recording.yaml", "reference.yaml", "runs.json", "run-1.npz", "run-2.npz"}
+    notes = json.loads((tmp_path / "seen" / "runs.json").read_text())
+    assert notes.keys() == {"source", "findings", "runs"}
+
+
+def test_random_cases_are_made_diagnosed_and_judged_and_go_on_after_an_interruption(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recordings, settings = tmp_path / "recordings", RandomCases(("emps",), 1, 1001)
+    recording_in(recordings / "emps", frame(0, 6), frame(1, 6))
+    list(conceal_at_random(settings, recordings, tmp_path / "results", tmp_path / "out", 1))
+    tables = {path.name: path.read_text() for path in (tmp_path / "out").iterdir()}
+    assert tables.keys() == {*at_random.TABLES, at_random.WEIGHED_FILE}
+    looks = (tmp_path / "results" / LOOKS_FILE).read_text().splitlines()
+    assert len(looks) == 2  # the validation run, with nothing concealed and with something
+
+    monkeypatch.setattr(at_random, "diagnose_concealed", lambda *_: pytest.fail("diagnosed again"))
+    list(conceal_at_random(settings, recordings, tmp_path / "results", tmp_path / "again", 1))
+    assert {path.name: path.read_text() for path in (tmp_path / "again").iterdir()} == tables
+
+    (made,) = (recordings / ".concealed").iterdir()
+    (made / "verdicts" / "emps-1" / "outcome.json").unlink()
+    list(judge_cases(settings, made, tmp_path / "judged"))
+    assert set(pd.read_csv(tmp_path / "judged" / "cases.csv")["refused"]) == {"no verdict"}
+    with pytest.raises(InputError, match="holds no case of staubli-tx40"):
+        list(judge_cases(RandomCases(("staubli-tx40",), 1, 1001), made, tmp_path / "judged"))
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [(["--make", "a", "--judge", "b"], "give one of them"), (["--judge", "b"], "--judge needs --seed")],
+)
+def test_steps_that_cannot_be_done_are_refused(options: list[str], complaint: str) -> None:
+    refused = CliRunner().invoke(main, ["real-concealed", *options])
+    assert refused.exit_code == 2
+    assert complaint in refused.output

@@ -1,0 +1,172 @@
+"""`armlab real` over folders, with a stand-in for the command that diagnoses."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner
+from numpy.testing import assert_allclose
+from told_recordings import frame, recording_in
+
+from armlab.cli.main import main
+from armlab.common.errors import InputError
+from armlab.proof.open.real_folders import runs
+from armlab.proof.open.real_folders.bench import FolderBench, bench_folders
+from armlab.proof.open.real_folders.errors import error_ratio, measure_errors
+from armlab.proof.open.real_folders.folders import find_folders
+from armlab.recordings.public import LOCAL_COPIES_VARIABLE
+
+STAND_IN = """
+import json, pathlib, sys
+folder, out = pathlib.Path(sys.argv[-3]), pathlib.Path(sys.argv[-1])
+with (folder.parent / "asked.txt").open("a") as asked:
+    asked.write(folder.name + "\\n")
+if folder.name == "broken":
+    sys.exit("armlab: link 1 is no body")
+out.mkdir(parents=True)
+finding = {"effect": "payload", "joint": 3, "parameters": {}, "probability": 0.95, "equation": "m_3 += 1 kg"}
+finding |= {"heldout_rms_before": 1.0, "heldout_rms_after": 2.0, "rivals": []}
+verdict = {"schema": "verdict/1", "status": "mismatch", "summary": "A payload.", "findings": [finding]}
+(out / "verdict.json").write_text(json.dumps(verdict | {"located": [], "unexplained": [], "fit": []}))
+"""
+FACTS = {
+    "schema": "facts/1",
+    "singles": {
+        "open": {"known": [{"effect": ["payload"], "joint": 3, "strong": True}]},
+        "secret": {"licence": "none", "never": ["payload"]},
+        "broken": {"known": [{"effect": ["payload"], "joint": 1}]},
+    },
+}
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FolderBench:
+    """Three folders, of which one is refused and none can be read, and facts about them."""
+    script = tmp_path / "stand_in.py"
+    script.write_text(STAND_IN)
+    monkeypatch.setattr(runs, "COMMAND", (sys.executable, str(script)))
+    for name in ("open", "secret", "broken"):
+        folder = tmp_path / "recordings" / name
+        folder.mkdir(parents=True)
+        (folder / "recording.yaml").write_text("schema: recording/1\n")
+    facts = tmp_path / "facts.yaml"
+    facts.write_text(yaml.safe_dump(FACTS))
+    return FolderBench(tmp_path / "recordings", facts, tmp_path / "results", tmp_path / "work", jobs=1)
+
+
+def asked(bench: FolderBench) -> list[str]:
+    """The folders that were diagnosed, one entry a time."""
+    assert bench.root is not None
+    return sorted((bench.root / "asked.txt").read_text().split())
+
+
+def test_single_recordings_and_pairs_are_found_at_any_depth(tmp_path: Path) -> None:
+    for place in ("a", "b/deep", "pair/old", "pair/new", "half/old"):
+        (tmp_path / place).mkdir(parents=True)
+        (tmp_path / place / "recording.yaml").touch()
+    (tmp_path / "raw").mkdir()
+    found = {each.name: each.pair for each in find_folders(tmp_path)}
+    assert found == {"a": False, "b/deep": False, "pair": True, "half/old": False}
+
+
+def test_a_row_says_what_is_told_and_a_failing_folder_why(bench: FolderBench) -> None:
+    lines = list(bench_folders(bench))
+    assert any(line.startswith("open: status mismatch, named 1") for line in lines)
+    assert "  wrong: never payload@3" in lines
+    assert "  no verdict: armlab: link 1 is no body" in lines
+    assert "no verdict: broken" in lines
+    singles = next(line for line in lines if line.startswith("singles:"))
+    assert "facts 1 named, 0 class, 0 cause, 0 minor, 1 missed; strong 1 named" in singles
+    assert "WRONG 2, extra 0" in singles
+
+
+def test_rows_without_a_licence_stand_on_the_local_page_alone(bench: FolderBench) -> None:
+    list(bench_folders(bench))
+    public = "".join(path.read_text() for path in bench.results.iterdir())
+    local = (bench.work / "folders.md").read_text()
+    assert "| open |" in public
+    assert "secret" not in public
+    assert "2 folders that may be published, of 3" in public
+    assert "| secret |" in local
+    assert (bench.work / ".gitignore").read_text() == "*\n"
+
+
+def test_folders_of_which_nothing_is_known_have_a_row_and_stay_local(bench: FolderBench) -> None:
+    lines = list(bench_folders(FolderBench(bench.root, None, bench.results, bench.work, jobs=1), ["open"]))
+    assert any(line.startswith("open: status mismatch, contradictions 1, words 2, findings 1") for line in lines)
+    assert not bench.results.exists()
+
+
+def test_a_run_goes_on_where_it_stopped_and_asks_again_for_another_recording(bench: FolderBench) -> None:
+    list(bench_folders(bench, ["open"]))
+    assert "1 of 3 folders are done already" in list(bench_folders(bench))
+    assert asked(bench) == ["broken", "open", "secret"]
+    assert bench.root is not None
+    (bench.root / "open" / "run.csv").write_text("t,q1\n")
+    list(bench_folders(bench))
+    assert asked(bench) == ["broken", "open", "open", "secret"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"singles": {"opn": {}}}, "names a recording that is not there, 'opn': did you mean 'open'?"),
+        ({"pairs": {"open": {}}}, "'open' stands under pairs in"),
+    ],
+)
+def test_facts_about_other_folders_are_refused_before_any_diagnosis(
+    bench: FolderBench, change: dict[str, Any], message: str
+) -> None:
+    assert bench.facts is not None
+    bench.facts.write_text(yaml.safe_dump({"schema": "facts/1", **change}))
+    with pytest.raises(InputError) as caught:
+        list(bench_folders(bench))
+    assert message in str(caught.value)
+    assert bench.root is not None
+    assert not (bench.root / "asked.txt").exists()
+
+
+def test_twice_the_error_is_a_ratio_of_two_with_no_spread() -> None:
+    plain = np.random.default_rng(0).normal(size=400)
+    ratio = error_ratio(2 * plain, plain, np.arange(400) // 20)
+    assert_allclose([ratio.value, *(ratio.interval or ())], 2.0)
+    assert error_ratio(plain, plain, np.arange(400) // 200).interval is None  # two blocks say nothing
+
+
+def test_the_interval_of_a_ratio_holds_one_as_often_as_it_says_for_models_that_are_alike() -> None:
+    rng, held = np.random.default_rng(1), 0
+    for _ in range(200):
+        low, high = error_ratio(*rng.normal(size=(2, 600)), np.arange(600) // 20).interval or (0.0, 0.0)
+        held += low < 1 < high
+    assert 0.9 <= held / 200 <= 0.99
+
+
+def test_identify_and_plain_least_squares_are_judged_on_the_same_torque(tmp_path: Path) -> None:
+    folder = recording_in(tmp_path / "recording", frame(0), frame(1))
+    errors = measure_errors(folder, tmp_path / "verdict", 20.0)
+    assert errors.notes == ("diagnose: it found no model",)
+    assert [each.joint for each in errors.joints] == [1, 2, 3]
+    for each in errors.joints:
+        assert set(each.percent) == {"identify"}
+        assert each.plain == pytest.approx(each.percent["identify"] / each.ratio["identify"].value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--part", "folders"], "set ARMLAB_RECORDINGS to the folder that holds the recordings"),
+        (["--part", "public", "--facts", "facts.yaml"], "--facts are about folders"),
+        (["--only", "em"], "unknown recording 'em': did you mean 'emps'?"),
+        (["--leave-one-out", "--part", "folders"], "--leave-one-out takes public recordings alone"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused_in_one_line(
+    arguments: list[str], message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(LOCAL_COPIES_VARIABLE, raising=False)
+    done = CliRunner().invoke(main, ["real", *arguments])
+    assert done.exit_code == 2
+    assert message in done.output

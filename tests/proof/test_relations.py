@@ -1,0 +1,89 @@
+"""Relations that need no truth: the short ones hold on a small recording, and a broken one is said."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from told_recordings import frame, recording_in
+
+from armlab.proof.open.relations.bench import bench_relations, relations_page
+from armlab.proof.open.relations.relations import NULL_PAIRS, QUICK, RELATIONS, Desk, Outcome, check_relation
+from armlab.proof.open.relations.variants import every_other_second, half, one_run, resampled, rewritten, thinned
+from armlab.recordings.load import load_recording
+from armlab.recordings.recording import Recording
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    return load_recording(recording_in(tmp_path_factory.mktemp("own") / "arm", frame(0, 6), frame(1, 6)))
+
+
+@pytest.fixture(scope="module")
+def desk() -> Desk:
+    return Desk()
+
+
+@pytest.mark.parametrize("name", [*QUICK, "X against X, rows thinned", "run against run", "units, order, names, clock"])
+def test_relation_holds_on_a_small_recording(name: str, recording: Recording, desk: Desk) -> None:
+    outcome = check_relation(name, recording, desk)
+    assert outcome.holds, outcome.detail
+
+
+def test_variants_hold_the_same_motion(recording: Recording) -> None:
+    first = recording.runs[0]
+    assert thinned(recording).runs[0].samples == 4 * first.samples // 5
+    other = resampled(recording).runs[0]
+    assert other.rate_hz == pytest.approx(0.9 * first.rate_hz)
+    there = np.interp(other.time, first.time, first.position[:, 1])
+    assert np.abs(other.position[:, 1] - there).max() < 1e-3
+    assert [run.name for run in rewritten(recording).runs] == [run.name for run in reversed(recording.runs)]
+
+
+def test_odd_and_even_seconds_share_no_row(recording: Recording) -> None:
+    even, odd = (every_other_second(recording, first, 1.0) for first in (0, 1))
+    stamps = [{(run.file, float(time)) for run in each.runs for time in run.time} for each in (even, odd)]
+    assert not stamps[0] & stamps[1]
+    assert len(even.runs) == len(odd.runs) == 6
+
+
+def test_halves_and_single_runs_share_no_row(recording: Recording) -> None:
+    first, second = half(recording, 0).runs[0], half(recording, 1).runs[0]
+    assert first.time[-1] < second.time[0]
+    assert first.samples == second.samples == recording.runs[0].samples // 2
+    alone = [one_run(recording, run) for run in recording.runs]
+    assert [[run.name for run in each.runs] for each in alone] == [[run.name] for run in recording.runs]
+    assert all(run.role == "identify" for each in alone for run in each.runs)
+
+
+def test_a_broken_relation_stands_in_the_table() -> None:
+    page = relations_page([Outcome("arm", "X against X", False, "payload@3"), Outcome("leg", "X against X", None, "-")])
+    assert "| X against X | **broken** | no answer |" in page
+    assert "payload@3" in page
+
+
+def test_outcomes_are_kept_for_the_next_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = recording_in(tmp_path / "arm", frame(0, 6), frame(1, 6))
+    asked: list[str] = []
+
+    def answer(name: str, recording: Recording, desk: Desk) -> Outcome:
+        asked.append(name)
+        return Outcome(recording.name, name, True, "")
+
+    monkeypatch.setattr("armlab.proof.open.relations.bench.check_relation", answer)
+    for _ in range(2):
+        lines = list(bench_relations(tmp_path / "results", tmp_path / "none", [folder], ["arm"]))
+    assert asked == list(RELATIONS)
+    assert len(lines) == len(RELATIONS) + 2
+
+
+def test_null_pairs_are_counted_on_a_page_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = recording_in(tmp_path / "arm", frame(0, 6), frame(1, 6))
+    answers = dict(zip(NULL_PAIRS, (True, False, None), strict=True))
+
+    def answer(name: str, recording: Recording, desk: Desk) -> Outcome:
+        return Outcome(recording.name, name, answers[name], "")
+
+    monkeypatch.setattr("armlab.proof.open.relations.bench.check_relation", answer)
+    lines = list(bench_relations(tmp_path / "results", tmp_path / "none", [folder], ["arm"], NULL_PAIRS))
+    assert "2 answers, a change is named in 1 (95 % interval 9.45 to 90.5 %)" in lines[-2]
+    assert [path.name for path in (tmp_path / "results").glob("*.md")] == ["null-pairs.md"]
