@@ -34,8 +34,8 @@ def names_found_once() -> Iterator[None]:
         return known[key]
 
     with pytest.MonkeyPatch.context() as patch:
-        for user in ("load", "diagnose"):
-            patch.setattr(f"armlab.diagnosis.{user}.find_names", find_once)
+        for user in ("carried_load", "diagnose"):
+            patch.setattr(f"armlab.diagnosis.torque.{user}.find_names", find_once)
         yield
 
 

@@ -18,7 +18,7 @@ def test_seconds_belong_to_the_stage_that_runs_and_to_none_twice():
 
 
 def test_every_stage_begins_with_a_message_that_a_diagnosis_tells():
-    sources = "".join(path.read_text(encoding="utf-8") for path in Path("armlab/diagnosis").rglob("*.py"))
+    sources = "".join(path.read_text(encoding="utf-8") for path in Path("armlab").rglob("*.py"))
     told = re.findall(r"progress\(f?\"([^\"]+)\"\)", sources)
     assert [start for start in STAGES if not any(message.startswith(start) for message in told)] == []
 
