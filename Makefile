@@ -37,60 +37,60 @@ lock: .venv/dev ## choose the versions of all dependencies anew
 # --- results
 
 table3: .venv/run ## the paper's comparison: results/table3.csv and .md
-	$(BIN)/armlab table3
+	$(BIN)/armlab paper table3
 
 figure2: .venv/run ## best cost and time against swarm size
-	$(BIN)/armlab figure2
+	$(BIN)/armlab paper figure2
 
 figure3: .venv/run ## average convergence
-	$(BIN)/armlab figure3
+	$(BIN)/armlab paper figure3
 
 paper: .venv/run ## all tables and figures of the paper, and what of it holds: results/paper/
-	$(BIN)/armlab paper
-	$(BIN)/armlab does-it-help
+	$(BIN)/armlab paper replication
+	$(BIN)/armlab paper does-it-help
 
 study: .venv/run ## the comparison where the paper stops: results/study/
-	$(BIN)/armlab study
+	$(BIN)/armlab paper study
 
 search-space: .venv/run ## what a search space within all limits does for each algorithm: results/search_space/
-	$(BIN)/armlab search-space
+	$(BIN)/armlab paper search-space
 
 tune: .venv/dev ## every algorithm tuned with the same budget, judged on problems that took no part: results/tune/
-	$(BIN)/armlab tune --overwrite
+	$(BIN)/armlab bench tune --overwrite
 
 landscape: .venv/run ## what makes an algorithm win, and which optimiser to take: results/landscape/, docs/which-optimiser.md
-	$(BIN)/armlab landscape
+	$(BIN)/armlab bench landscape
 
 best-known: .venv/run ## ten minutes more for the best trajectories known: results/best_known.json
-	$(BIN)/armlab best-known
+	$(BIN)/armlab bench best-known
 
 real: .venv/dev ## identify and diagnose the public recordings of real arms: results/real/arms.md
-	$(BIN)/armlab real --part public
+	$(BIN)/armlab proof real --part public
 
 real-leave-one-out: .venv/dev ## settings chosen on all real arms but one, judged on that one
-	$(BIN)/armlab real --leave-one-out
+	$(BIN)/armlab proof real --leave-one-out
 
 real-conditioning: .venv/dev ## does a small condition number help on real arms: results/real/conditioning.md
-	$(BIN)/armlab real-conditioning
+	$(BIN)/armlab proof real-conditioning
 
 real-motion: .venv/dev ## diagnose the public recordings of position servos: results/real/motion.md
-	$(BIN)/armlab real-motion --peer sysid
+	$(BIN)/armlab proof real-motion --peer sysid
 
 relations: .venv/dev ## relations that need no truth, on real recordings and a few simulated ones: results/relations/
 	$(BIN)/armlab conceal --cases 8 --seed 1800 --out .armlab/relations-set
-	$(BIN)/armlab relations .armlab/relations-set/observations/*
+	$(BIN)/armlab proof relations .armlab/relations-set/observations/*
 
 prove-changes: .venv/dev ## the comparison judged on pairs with nothing or one thing changed: results/proof/changes/
-	$(BIN)/armlab prove-changes --results results/proof/changes
+	$(BIN)/armlab proof changes --results results/proof/changes
 
 prove: .venv/dev ## hide effects, diagnose blindly, score, all judged and logged: results/proof/
-	$(BIN)/armlab prove
+	$(BIN)/armlab proof run
 
 prove-quick: .venv/dev ## the same with a few cases of each tier, of a development seed, not logged
-	$(BIN)/armlab prove --quick --results .armlab/proof-quick
+	$(BIN)/armlab proof run --quick --results .armlab/proof-quick
 
 speed: .venv/dev ## how fast, beside Pinocchio, CasADi, mealpy, pygmo and scipy: results/speed.json and .md
-	$(BIN)/armlab speed
+	$(BIN)/armlab tools speed
 
 # --- documentation
 
@@ -128,7 +128,7 @@ structure: .venv/dev ## figures of the source tree: files, lines, modules that a
 	$(BIN)/python tools/structure.py
 
 regression: .venv/dev ## the best condition numbers against the committed baseline
-	$(BIN)/armlab regression
+	$(BIN)/armlab tools regression
 
 fuzz: .venv/dev ## damaged files for every reader of recordings, FUZZ_SECONDS in all
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[fuzz]' --no-build-isolation

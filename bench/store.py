@@ -224,7 +224,7 @@ def _advice_on_error(error: sqlite3.DatabaseError, path: Path) -> str:
     if code in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
         return "; all outcomes stored before are safe: free some space, and the same command continues"
     if code == sqlite3.SQLITE_CORRUPT:
-        return f"; `armlab salvage {path} --out NEW` takes what is readable into a new store"
+        return f"; `armlab bench salvage {path} --out NEW` takes what is readable into a new store"
     return ""
 
 

@@ -1,4 +1,4 @@
-"""What `run`, `table3` and `report` print: the table of the ends, and who beats whom on each problem."""
+"""What `run`, `paper table3` and `report` print: the table of the ends, and who beats whom on each problem."""
 
 from collections.abc import Iterator, Sequence
 

@@ -87,8 +87,8 @@ class KinematicTree:
             return InputError(message)
         ends = ", ".join(f"{link} ({count} joint{'s' * (count > 1)})" for link, count in self.ends.items())
         return UndecidedError(
-            f"{message}: say with --tip of `armlab recording import` or `armlab lock-joints` where the arm ends, and "
-            f"the joints beside it are locked: {ends}",
+            f"{message}: say with --tip of `armlab recording import` or `armlab model lock-joints` where the arm ends, "
+            f"and the joints beside it are locked: {ends}",
             "tip",
             tuple(self.ends),
         )

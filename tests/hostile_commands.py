@@ -148,13 +148,13 @@ def servo_csv() -> str:
 
 @cache
 def shared_results() -> dict[str, str]:
-    """The files of a small experiment as `share` writes them."""
+    """The files of a small experiment as `bench share` writes them."""
     with TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "experiment.yaml").write_text(yaml.safe_dump(EXPERIMENT | {"repetitions": 3, "algorithms": PAIR}))
         store = ["--store", f"{name}/s.sqlite"]
         run = ["run", f"{name}/experiment.yaml", "--workers", "1", *store, "--results", f"{name}/results"]
-        share = ["share", f"{name}/experiment.yaml", *store, "--out", f"{name}/shared"]
+        share = ["bench", "share", f"{name}/experiment.yaml", *store, "--out", f"{name}/shared"]
         for words in (run, share):
             done = CliRunner().invoke(armlab, words)
             if done.exit_code != 0:
@@ -285,7 +285,7 @@ def _write_inputs(folder: Path, rng: random.Random, damaged: str) -> None:
 
 
 def _write_results(folder: Path, rng: random.Random, damaged: str) -> None:
-    """Results that `share` wrote, one file of them damaged."""
+    """Results that `bench share` wrote, one file of them damaged."""
     (folder / "shared").mkdir()
     for name, text in shared_results().items():
         if damaged == name.removesuffix(".csv") and name.endswith(".csv"):
@@ -296,37 +296,37 @@ def _write_results(folder: Path, rng: random.Random, damaged: str) -> None:
 
 
 RECORD = "joint-fourier-rest-250hz"
-EXPORT = f"export problem.yaml --record {RECORD} --results records --format ros2 --rate 250"
+EXPORT = f"bench export problem.yaml --record {RECORD} --results records --format ros2 --rate 250"
 NEXT = "next verdict.json --robot arm.yaml --evaluations 50 --duration 2 --rate 100 --harmonics 3 --out next"
 COMMANDS = {
-    "base": "base robot.yaml",
-    "export-model": "export-model model.yaml out.xml",
+    "base": "model base-parameters robot.yaml",
+    "export-model": "model export model.yaml out.xml",
     "run": "run experiment.yaml --dry-run --workers 1 --store s.sqlite --results r",
     "identify": "identify rec --as-read --out out",
     "predict": "predict model.yaml rec --out out",
     "check": "recording check rec --out check.html",
     "payload": "payload rec --link 3 --centre 0 0 0.1 --cutoff-hz 5",
-    "gains": "gains rec --without rec --mass 5 --centre 0 0 0.1",
+    "gains": "recording gains rec --without rec --mass 5 --centre 0 0 0.1",
     "import": "recording import rec/run.csv --robot irb120-arm --position q* --torque u* --time t --out new "
     "--unit position=rad --unit torque=N.m --unit time=s",
-    "lock-urdf": "lock-joints toy.urdf out.urdf --tip hand --lock finger1=0.02",
-    "lock-mjcf": "lock-joints toy.xml out.xml --tip hand --lock finger1=0.2",
-    "export-whole-urdf": "export-model urdf-model.yaml out.urdf",
-    "export-whole-mjcf": "export-model xml-model.yaml out.xml",
-    "export-into": "export-model urdf-model.yaml out.xml --into toy.urdf --lock finger1=0.01",
-    "base-urdf": "base toy.urdf",
+    "lock-urdf": "model lock-joints toy.urdf out.urdf --tip hand --lock finger1=0.02",
+    "lock-mjcf": "model lock-joints toy.xml out.xml --tip hand --lock finger1=0.2",
+    "export-whole-urdf": "model export urdf-model.yaml out.urdf",
+    "export-whole-mjcf": "model export xml-model.yaml out.xml",
+    "export-into": "model export urdf-model.yaml out.xml --into toy.urdf --lock finger1=0.01",
+    "base-urdf": "model base-parameters toy.urdf",
     "import-gripper": "recording import rec/run.csv --robot toy.urdf --tip hand --lock finger1=0.02 --position q* "
     "--torque u* --time t --out new --unit position=rad --unit torque=N.m --unit time=s",
-    "confusability": "confusability irb120-arm motion.csv --noise 0.1",
+    "confusability": "model confusability irb120-arm motion.csv --noise 0.1",
     "diagnose": "diagnose rec --out out",
     "compare-recordings": "diagnose rec --compare rec --out out",
     "servo": "diagnose servo --out out",
     "check-servo": "recording check servo --out check.html",
     "report": "report shared --out page.html",
-    "duels": "duels shared spso --out duels",
-    "draw": "draw shared --out drawn",
-    "share": "share shared --as latex --out tables",
-    "compare": "compare shared shared --out compared",
+    "duels": "bench duels shared spso --out duels",
+    "draw": "bench draw shared --out drawn",
+    "share": "bench share shared --as latex --out tables",
+    "compare": "bench compare shared shared --out compared",
     "export": f"{EXPORT} --out motion.yaml",
     "export-over-problem": f"{EXPORT} --out problem.yaml",
     "export-over-records": f"{EXPORT} --out records/best_known.json",
@@ -343,6 +343,7 @@ COMMANDS = {
     "next-safety": f"{NEXT} --safety safety.yaml",
 }
 WRITES_WITH_REFUSAL = {"check": "check.html", "check-servo": "check.html"}
+NOUNS = ("recording", "model", "bench")
 OF_RESULTS = ("report", "duels", "draw", "share", "compare")
 
 
@@ -433,8 +434,8 @@ KINDS = (
 
 def damage_words(words: list[str], rng: random.Random) -> list[str]:
     """The words with one value of an option or argument replaced; the command and the flags stay."""
-    fixed = {"import", "check"}
-    places = [n for n in range(1, len(words)) if not words[n].startswith("--") and words[n] not in fixed]
+    first = 2 if words[0] in NOUNS else 1
+    places = [n for n in range(first, len(words)) if not words[n].startswith("--")]
     place = rng.choice(places)
     return [*words[:place], rng.choice(HOSTILE_WORDS), *words[place + 1 :]]
 

@@ -1,8 +1,9 @@
 """Processor time and memory of this tree beside those of an earlier commit: `python -m tools.time_against COMMIT`.
 
-What is timed is `armlab table3` in one process, or with `--diagnose RECORDING...` `armlab diagnose` of each recording,
-whose two verdicts are compared, too. Both trees take turns, with the libraries of this environment. The ratio is that
-of the least times, the start of Python included, as other work on the machine only adds; its range is that of rounds.
+What is timed is `armlab run configs/table3.yaml` in one process, or with `--diagnose RECORDING...` `armlab diagnose` of
+each recording, whose two verdicts are compared, too. Both trees take turns, with the libraries of this environment.
+The ratio is that of the least times, the start of Python included, as other work on the machine only adds; its range
+is that of rounds.
 """
 
 import argparse
@@ -64,7 +65,16 @@ def parse_options(words: Sequence[str]) -> argparse.Namespace:
 
 
 def _table3_words(out: Path) -> list[str]:
-    return ["table3", "--workers", "1", "--store", str(out / "runs.sqlite"), "--results", str(out / "results")]
+    return [
+        "run",
+        "configs/table3.yaml",
+        "--workers",
+        "1",
+        "--store",
+        str(out / "runs.sqlite"),
+        "--results",
+        str(out / "results"),
+    ]
 
 
 TABLE_3 = TimedCommand("Table 3", _table3_words)

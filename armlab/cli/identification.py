@@ -1,14 +1,12 @@
-"""The commands of identification and the studies of it: options only, no logic."""
+"""Commands of identification: `armlab identify`, `predict`, `payload` and `recording gains`."""
 
-import json
-import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import click
 
-from armlab.cli.options import FiniteNumber, OutputPath, lock_option, tip_option
-from armlab.cli.output import prints_lines, prints_result, tell_progress
+from armlab.cli.options import FiniteNumber, OutputPath
+from armlab.cli.output import prints_result, tell_progress
 from armlab.common.documents import ResultLines
 
 METHODS = ("weighted", "ordinary", "alike", "huber", "tukey", "total", "likelihood", "instrumental", "physical")
@@ -68,54 +66,6 @@ def predict(model: Path, recording: Path, out: Path | None) -> ResultLines:
     from armlab.identification.identify import predict_recording
 
     return predict_recording(model, recording, out)
-
-
-@click.command()
-@click.option("--experiments", type=click.IntRange(min=10), default=1000, show_default=True)
-@click.option("--seed", type=int, default=0, show_default=True)
-@click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
-@click.option(
-    "--part",
-    type=click.Choice(["all", "identification", "superiority"]),
-    default="all",
-    show_default=True,
-    help="Measure a part alone; the file keeps the other one.",
-)
-@prints_lines
-def coverage(experiments: int, seed: int, results: Path, part: str) -> Iterator[str]:
-    """Measure how often 95 % intervals contain the truth.
-
-    Simulates experiments and identifies them, and compares simulated ends of two algorithms (A12). Writes
-    coverage.json.
-    """
-    from armlab.common.files import write_texts
-    from armlab.proof.open.coverage import measure_coverage
-    from bench.statistics.superiority import describe_coverage, superiority_coverage
-
-    path = results / "coverage.json"
-    found = json.loads(path.read_text()) if part != "all" and path.exists() else {}
-    if part != "superiority":
-        found |= yield from measure_coverage(experiments, seed)
-    if part != "identification":
-        found["superiority"] = superiority_coverage()
-        yield from describe_coverage(found["superiority"])
-    yield from map(str, write_texts({path.name: json.dumps(found, indent=2, allow_nan=False) + "\n"}, results))
-
-
-@click.command("real-conditioning")
-@click.option("--results", type=OutputPath(), default=Path("results/real"), show_default=True)
-@click.option("--recordings", type=OutputPath(), default=Path(".armlab/recordings"), show_default=True)
-@click.option("--only", multiple=True, help="Name of a public recording [default: all five arms].")
-@prints_lines
-def real_conditioning(results: Path, recordings: Path, only: tuple[str, ...]) -> Iterator[str]:
-    """Test on real arms whether a small condition number helps.
-
-    Identifies each public recording from many windows and predicts the runs that validate. Writes conditioning.md,
-    two tables and a picture.
-    """
-    from armlab.proof.open.conditioning.study import study_conditioning
-
-    return study_conditioning(results, recordings, only, tell_progress)
 
 
 def _add_load_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -200,30 +150,3 @@ def gains(
     from armlab.identification.payload import PayloadSetting, Place, gains_lines
 
     return gains_lines(loaded, without, mass, PayloadSetting(Place(link, centre), counterbalance, cutoff_hz))
-
-
-@click.command("lock-joints")
-@click.argument("robot", type=click.Path(path_type=Path))
-@click.argument("out", type=OutputPath())
-@tip_option
-@lock_option
-@prints_result
-def lock_joints(robot: Path, out: Path, tip: str | None, lock: tuple[str, ...]) -> ResultLines:
-    """Make one arm of ROBOT and write it to OUT.
-
-    ROBOT: a URDF or MJCF file with a gripper, mimic fingers or several arms.
-    OUT: a new file of the same kind. The links of locked joints stay, with mass.
-    """
-    from armlab.common.errors import InputError
-    from armlab.common.files import refuse_existing, write_whole
-    from problem.locked_joints import lock_joints as lock_in_file
-    from problem.locked_joints import parse_locks
-
-    refuse_existing([out])
-    locked = lock_in_file(robot, tip, parse_locks(lock), out.parent)
-    if out.suffix != robot.suffix:
-        raise InputError(f"{out}: the file should end in {robot.suffix}, as {robot} does")
-    original = Path(os.path.relpath(locked.original, out.parent)).as_posix()
-    write_whole(out, locked.text(original))
-    yield f"{out}: {locked.words}"
-    return {"files": [out], "joints": [joint.name for joint in locked.arm.joints], "locked": locked.positions}

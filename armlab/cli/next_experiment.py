@@ -1,4 +1,4 @@
-"""Write the next experiment: the designed motion in all forms of `armlab export`, the card and the picture.
+"""Write the next experiment: the designed motion in all forms of `armlab bench export`, the card and the picture.
 
 Apart from the click commands, since it imports the diagnosis, and `armlab --help` imports all modules of commands.
 """

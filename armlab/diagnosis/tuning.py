@@ -797,7 +797,7 @@ def find_number(name: str) -> TuningNumber:
     known = {each.name: each for each in tuning_numbers(Tuning())}
     if name not in known:
         close = suggest_name(name, list(known))
-        hint = close if close.startswith("did") else "`armlab tuning` lists them all"
+        hint = close if close.startswith("did") else "`armlab tools tuning` lists them all"
         raise InputError(f"{name}: no such tuning number, {hint}")
     return known[name]
 
@@ -861,9 +861,9 @@ def _value_text(value: object) -> str:
 def tuning_page() -> str:
     """`docs/tuning.md`: all numbers with value, unit, meaning and source."""
     intro = (
-        "Each number that was chosen, by stage of the diagnosis (`armlab/diagnosis/tuning.py`). `armlab tuning --out "
-        "docs/tuning.md` writes this page. `armlab diagnose --set noise.max_order=8` takes another value, and "
-        "`armlab ablate --vary noise.max_order=8` measures what that changes."
+        "Each number that was chosen, by stage of the diagnosis (`armlab/diagnosis/tuning.py`). `armlab tools tuning "
+        "--out docs/tuning.md` writes this page. `armlab diagnose --set noise.max_order=8` takes another value, and "
+        "`armlab proof ablate --vary noise.max_order=8` measures what that changes."
     )
     parts = []
     for stage in fields(Tuning):

@@ -266,7 +266,9 @@ def _read_base_values(file: ModelFile, structure: Structure, inertial: Array | N
             raise InputError(f"{path} has neither links nor base_parameters")
         return structure.base.values(inertial)
     if file.base_parameters.names != structure.base.sums or len(file.base_parameters.values) != len(structure.base):
-        raise InputError(f"{path}: base_parameters are not those of {structure.arm.name}: see `armlab base`")
+        raise InputError(
+            f"{path}: base_parameters are not those of {structure.arm.name}: see `armlab model base-parameters`"
+        )
     return np.array(file.base_parameters.values)
 
 

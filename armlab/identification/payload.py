@@ -4,7 +4,7 @@ Links and friction are the same in all runs; only what differs between them dete
 and Lemoine 2007). A known load shows the gain of each joint's torque reading (Gautier and Briot 2014).
 
 The load is a body that can exist: its pseudo-inertia is positive semidefinite. `payload_lines` and `gains_lines` go
-from recordings with and without the load to the lines of `armlab payload` and `armlab gains`.
+from recordings with and without the load to the lines of `armlab payload` and `armlab recording gains`.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""`armlab export-model`: a model in the user's own URDF or MJCF, or as a chain of its own."""
+"""`armlab model export`: a model in the user's own URDF or MJCF, or as a chain of its own."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

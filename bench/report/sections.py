@@ -276,7 +276,7 @@ def origin_part(results: ResultSet) -> Origin:
     text += f", and the whole path of {join_words(lapack)}, which call LAPACK." if lapack else "."
     steps = (
         f"armlab run {results.name}.yaml\narmlab report {results.name}.yaml\n"
-        f"armlab share {results.name}.yaml --as csv --out {results.name}_tables"
+        f"armlab bench share {results.name}.yaml --as csv --out {results.name}_tables"
     )
     return Origin(text, steps, Table(headings, rows, tuple(machines)), results.settings)
 

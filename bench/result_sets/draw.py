@@ -1,4 +1,4 @@
-"""`armlab draw`: the figures that fit a result set."""
+"""`armlab bench draw`: the figures that fit a result set."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`armlab duels`: one algorithm of a result set against every other, with effect sizes, intervals and power."""
+"""`armlab bench duels`: one algorithm of a result set against every other, with effect sizes, intervals and power."""
 
 from collections.abc import Hashable, Iterator, Mapping
 from pathlib import Path

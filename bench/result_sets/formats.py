@@ -102,14 +102,14 @@ def read_tidy(folder: Path) -> ResultSet:
 
 
 def _check_origins(origins: Any) -> tuple[dict[str, Any], ...]:
-    """The machines that took part; raises ValueError where they are not as `share` writes them."""
+    """The machines that took part; raises ValueError where they are not as `bench share` writes them."""
     if not isinstance(origins, list) or not all(isinstance(each, dict) for each in origins):
         raise ValueError(f"{ORIGINS} should be a list with a mapping for each machine")
     return tuple(origins)
 
 
 def _check_settings(settings: Any) -> str:
-    """The name of the results; raises ValueError where settings are not as `share` writes them."""
+    """The name of the results; raises ValueError where settings are not as `bench share` writes them."""
     wanted = {"name": str, "seed": int, "problem": dict, "algorithms": dict}
     for key, kind in wanted.items():
         if not isinstance(settings, dict) or not isinstance(settings.get(key), kind):

@@ -1,5 +1,5 @@
-"""Properties of the algorithms, `armlab properties`: behaviour on a problem that is shifted, scaled or pure noise, and
-overhead.
+"""Properties of the algorithms, `armlab bench properties`: behaviour on a problem that is shifted, scaled or pure
+noise, and overhead.
 """
 
 import json

@@ -7,16 +7,22 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
+import pytest
 from click.testing import CliRunner
 
+from armlab.cli.commands import MOVED, CommandTable
 from armlab.cli.main import main
 
 Armlab = Callable[..., "subprocess.CompletedProcess[str]"]
 COLUMNS = "algorithm,minimum,average,standard_deviation,median,lower_quartile,upper_quartile,feasible_share,evaluations"
 
 
-def test_help_imports_nothing_heavy() -> None:
-    command = [sys.executable, "-X", "importtime", "-m", "armlab.cli.main", "--help"]
+NOUNS = ("recording", "model", "bench", "paper", "proof", "tools")
+
+
+@pytest.mark.parametrize("words", [(), *((noun,) for noun in NOUNS)], ids=" ".join)
+def test_help_imports_nothing_heavy(words: tuple[str, ...]) -> None:
+    command = [sys.executable, "-X", "importtime", "-m", "armlab.cli.main", *words, "--help"]
     imported = subprocess.run(command, capture_output=True, text=True, check=True).stderr
     names = {line.rsplit("|", 1)[-1].strip().split(".")[0] for line in imported.splitlines()}
     assert "click" in names
@@ -24,10 +30,29 @@ def test_help_imports_nothing_heavy() -> None:
 
 
 def test_the_help_line_of_every_command_fits_into_a_terminal_of_eighty_columns() -> None:
-    for group in ([], ["recording"]):
+    for group in ([], *([noun] for noun in NOUNS)):
         told = CliRunner().invoke(main, [*group, "--help"], terminal_width=80)
         assert told.exit_code == 0
         assert "..." not in told.output.partition("Options:")[2]
+
+
+def test_the_first_screen_has_at_most_eighteen_commands() -> None:
+    assert isinstance(main, CommandTable)
+    assert len(main.places) <= 18
+    assert {name for name, place in main.places.items() if not place} == set(NOUNS)
+
+
+@pytest.mark.parametrize("name", MOVED)
+def test_an_earlier_name_is_refused_in_one_line_with_what_to_write_now(name: str) -> None:
+    done = CliRunner().invoke(main, [name, "--workers", "2"])
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert done.stderr == f"armlab: `armlab {name}` is now `armlab {MOVED[name]}`\n"
+    assert CliRunner().invoke(main, [*MOVED[name].split(), "--help"]).exit_code == 0
+
+
+def test_a_misspelt_command_of_a_noun_is_refused_with_the_nearest() -> None:
+    assert "Did you mean 'paper table3'?" in CliRunner().invoke(main, ["tabel3"]).stderr
+    assert "Did you mean 'table3'?" in CliRunner().invoke(main, ["paper", "tabel3"]).stderr
 
 
 def test_run_writes_table_page_times_and_settings(armlab: Armlab, small: Path, tmp_path: Path) -> None:
@@ -125,7 +150,7 @@ def test_a_plug_in_that_ends_its_process_fails_alone(
 
 
 def test_list_names_algorithms_and_problems(armlab: Armlab) -> None:
-    said = armlab("list").stdout
+    said = armlab("bench", "list").stdout
     assert "mupso, spso, woa, gwo, goa, de" in said
     assert "sphere" in said
 
@@ -143,6 +168,6 @@ def test_check_names_the_broken_promise(armlab: Armlab, plug_in: Callable[[str],
 
 
 def test_a_reader_that_goes_away_is_no_traceback(small: Path) -> None:
-    command = f"{sys.executable} -m armlab.cli.main list | true"
+    command = f"{sys.executable} -m armlab.cli.main bench list | true"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
     assert done.stderr == ""

@@ -73,7 +73,11 @@ def test_a_plug_in_that_breaks_the_contract_is_one_line_and_its_trials_are_losse
     assert "3 trials of plug-in on sphere failed and count as infeasible" in (
         small.parent / "results" / "small.md"
     ).read_text().replace("\n", " ")
-    for command in (["report", small.name], ["draw", small.name, "--out", "fig"], ["share", small.name, "--out", "t"]):
+    for command in (
+        ["report", small.name],
+        ["bench", "draw", small.name, "--out", "fig"],
+        ["bench", "share", small.name, "--out", "t"],
+    ):
         assert armlab(*command).returncode == 0, command
     page = (small.parent / "results" / "small_report.html").read_text()
     assert "3 trials of plug-in on sphere failed and count as infeasible" in page

@@ -174,4 +174,4 @@ def test_the_ceiling_is_one_for_equal_halves_and_zero_for_reversed_ones() -> Non
 
 def test_without_a_record_the_way_to_one_is_told(tmp_path: Path) -> None:
     told = refusal(study.make_does_it_help, tmp_path, 1)
-    assert told == "there is no best-known record of 'joint-fourier': make one with `armlab best-known`"
+    assert told == "there is no best-known record of 'joint-fourier': make one with `armlab bench best-known`"

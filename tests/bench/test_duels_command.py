@@ -1,4 +1,4 @@
-"""`armlab duels`: one algorithm of a result set against every other."""
+"""`armlab bench duels`: one algorithm of a result set against every other."""
 
 from pathlib import Path
 

@@ -87,9 +87,9 @@ def test_what_is_readable_of_a_damaged_store_is_saved_and_the_rest_computed_agai
     damaged = path.read_bytes()
     refused = armlab("run", many.name, "--store", path)
     assert refused.returncode == 2
-    assert "malformed; `armlab salvage" in refused.stderr
+    assert "malformed; `armlab bench salvage" in refused.stderr
     assert refused.stderr.count("\n") == 1
-    saved = armlab("salvage", path, "--out", "new.sqlite")
+    saved = armlab("bench", "salvage", path, "--out", "new.sqlite")
     assert saved.returncode == 0, saved.stderr
     assert path.read_bytes() == damaged
     kept = _count(many.with_name("new.sqlite"))

@@ -1,4 +1,4 @@
-"""`armlab scale` counts what kills cost, and what sweeps take; the long runs are its own, these are its small ones."""
+"""`armlab tools scale` counts what kills cost, and what sweeps take; the long runs are its own, these are small."""
 
 from pathlib import Path
 
@@ -40,7 +40,7 @@ def test_a_sweep_of_a_size_has_as_many_repetitions_as_make_it(tmp_path: Path) ->
 
 
 def test_the_memory_and_the_end_of_a_command_are_seen(tmp_path: Path) -> None:
-    seen = watch_command(["list"], tmp_path)
+    seen = watch_command(["bench", "list"], tmp_path)
     assert seen.seconds > 0
     assert 5 < seen.peak < 1000
     assert seen.after(0.0) == seen.memory[0]

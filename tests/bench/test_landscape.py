@@ -1,4 +1,4 @@
-"""`armlab landscape`: features with known answers, what correlations may claim, and the pages from small tables."""
+"""`armlab bench landscape`: features with known answers, what correlations may claim, and pages from small tables."""
 
 import re
 from contextlib import nullcontext
@@ -246,7 +246,7 @@ def committed(tmp_path: Path) -> LandscapeOptions:
 
 
 def test_the_committed_pages_say_what_the_results_say(tmp_path: Path) -> None:
-    """If this fails after a new run of a study: `armlab landscape --pages`."""
+    """If this fails after a new run of a study: `armlab bench landscape --pages`."""
     options = committed(tmp_path)
     written = list(make_landscape(options, silent_bar))
     assert len(written) == 8

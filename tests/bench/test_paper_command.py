@@ -1,4 +1,4 @@
-"""`armlab paper` on a small scale: every file is there, every claim has a verdict, the page needs nothing beside it."""
+"""`armlab paper replication` on a small scale: all files, a verdict for every claim, a page that needs nothing else."""
 
 import re
 from contextlib import nullcontext

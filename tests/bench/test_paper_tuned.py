@@ -88,10 +88,10 @@ def test_ends_that_are_missing_or_of_another_form_are_told_with_the_command(
     settings: TuningSettings, tmp_path: Path
 ) -> None:
     study = ROOT / "results" / "study"
-    with pytest.raises(InputError, match=r"cannot read .*tune_ends.csv, which `armlab tune` writes"):
+    with pytest.raises(InputError, match=r"cannot read .*tune_ends.csv, which `armlab bench tune` writes"):
         read_tuned_evidence(tmp_path, study)
     ends_table(judged(settings).frame).drop(columns="violation").to_csv(tmp_path / "tune_ends.csv", index=False)
-    with pytest.raises(InputError, match="lacks the columns violation: `armlab tune` writes it anew"):
+    with pytest.raises(InputError, match="lacks the columns violation: `armlab bench tune` writes it anew"):
         read_tuned_evidence(tmp_path, study)
-    with pytest.raises(InputError, match=r"cannot read .*study_mupso.csv, which `armlab study` writes"):
+    with pytest.raises(InputError, match=r"cannot read .*study_mupso.csv, which `armlab paper study` writes"):
         read_tuned_evidence(tmp_path, tmp_path)

@@ -38,7 +38,7 @@ def run(plugin: Path) -> Run:
 
 
 def test_its_names_are_listed(run: Run) -> None:
-    listed = run("armlab.cli.main", "list").stdout
+    listed = run("armlab.cli.main", "bench", "list").stdout
     assert "evolution-strategy" in listed
     assert "reaching" in listed
 

@@ -7,7 +7,8 @@ import pytest
 from click.testing import CliRunner
 from small_results import Ran, ran
 
-from armlab.cli.harness import compare, draw, report, share
+from armlab.cli.bench import compare, draw, share
+from armlab.cli.experiments import report
 from bench.config import read_experiment
 from bench.plan import plan_trials
 from bench.store import open_store

@@ -1,4 +1,4 @@
-"""`armlab search-space` on a small scale, and what its tables say."""
+"""`armlab paper search-space` on a small scale, and what its tables say."""
 
 from contextlib import nullcontext
 from dataclasses import replace

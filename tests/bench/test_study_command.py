@@ -1,4 +1,4 @@
-"""`armlab study` on a small scale, and what its tables say."""
+"""`armlab paper study` on a small scale, and what its tables say."""
 
 from contextlib import nullcontext
 from pathlib import Path

@@ -128,7 +128,7 @@ def test_what_is_no_motion_of_this_arm_is_refused_in_one_line(tmp_path: Path) ->
 
 def test_the_command_writes_page_tables_and_pictures(tmp_path: Path) -> None:
     frame(0, 4).to_csv(tmp_path / "plan.csv", index=False)
-    arguments = ["confusability", "irb120-arm", str(tmp_path / "plan.csv"), "--noise", "0.05", "--out"]
+    arguments = ["model", "confusability", "irb120-arm", str(tmp_path / "plan.csv"), "--noise", "0.05", "--out"]
     result = CliRunner().invoke(main, [*arguments, str(tmp_path / "card")])
     assert result.exit_code == 0, result.output
     names = {each.name for each in (tmp_path / "card").iterdir()}

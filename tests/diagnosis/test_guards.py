@@ -74,7 +74,7 @@ def test_stages_that_a_guard_or_a_number_has_no_part_in_need_not_be_done_again(m
 
 
 def test_an_ablation_refuses_a_number_that_there_is_not_before_it_starts(tmp_path: Path) -> None:
-    result = CliRunner().invoke(main, ["ablate", "--work", str(tmp_path / "work"), "--vary", "noise.order=8"])
+    result = CliRunner().invoke(main, ["proof", "ablate", "--work", str(tmp_path / "work"), "--vary", "noise.order=8"])
     assert result.exit_code == 2
     assert "noise.order: no such tuning number, did you mean 'noise.max_order'?" in result.output
     assert not (tmp_path / "work").exists()

@@ -83,7 +83,7 @@ def test_a_peer_without_its_packages_is_refused_with_the_extra_that_has_them(mon
 
 
 def test_windows_of_a_peer_that_is_not_asked_for_are_refused(tmp_path: Path) -> None:
-    result = CliRunner().invoke(main, ["real-motion", "--results", str(tmp_path), "--peer-windows", "3"])
+    result = CliRunner().invoke(main, ["proof", "real-motion", "--results", str(tmp_path), "--peer-windows", "3"])
     assert result.exit_code != 0
     assert "give both" in result.output
-    assert f"[default: {WINDOWS}]" in CliRunner().invoke(main, ["real-motion", "--help"]).output
+    assert f"[default: {WINDOWS}]" in CliRunner().invoke(main, ["proof", "real-motion", "--help"]).output

@@ -98,5 +98,5 @@ def test_a_diagnosis_refuses_a_number_that_there_is_not(tmp_path: Path) -> None:
 
 def test_the_page_of_tuning_numbers_is_up_to_date() -> None:
     text = (ROOT / "docs" / "tuning.md").read_text(encoding="utf-8")
-    assert text == tuning_page(), "run `armlab tuning --out docs/tuning.md`"
-    assert CliRunner().invoke(main, ["tuning"]).output == text
+    assert text == tuning_page(), "run `armlab tools tuning --out docs/tuning.md`"
+    assert CliRunner().invoke(main, ["tools", "tuning"]).output == text

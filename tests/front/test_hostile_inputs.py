@@ -60,12 +60,12 @@ def urdf(joints: int, mass: float = 1.0, name: str = "") -> str:
         (("identify", "rec", "--tolerance", "nan"), "nan is not a finite number"),
         (("identify", "rec", "--cutoff-hz", "inf"), "inf is not a finite number"),
         (("payload", "rec", "--centre", "nan", "0", "0"), "nan is not a finite number"),
-        (("confusability", "irb120-arm", "rec", "--noise", "nan"), "nan is not a finite number"),
+        (("model", "confusability", "irb120-arm", "rec", "--noise", "nan"), "nan is not a finite number"),
         (("next", "v.json", "--robot", "irb120-arm", "--duration", "nan"), "nan is not a finite number"),
         (("next", "v.json", "--robot", "irb120-arm", "--duration", "1e9"), "not in the range"),
         (("next", "v.json", "--robot", "irb120-arm", "--harmonics", "100000000"), "not in the range"),
         (("next", "v.json", "--robot", "irb120-arm", "--rate", "1e12"), "not in the range"),
-        (("export", "p.yaml", "--record", "r", "--rate", "1e9", "--out", "x"), "not in the range"),
+        (("bench", "export", "p.yaml", "--record", "r", "--rate", "1e9", "--out", "x"), "not in the range"),
         (("diagnose", "rec", "--out", ""), "an empty name"),
     ],
 )
@@ -88,22 +88,22 @@ def test_numbers_and_places_that_cannot_be_meant_are_refused_at_once(
 def test_robots_out_of_this_world_are_refused(tmp_path: Path, content: str, message: str) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text(content)
-    assert message in run_refused(tmp_path, "base", path)
+    assert message in run_refused(tmp_path, "model", "base-parameters", path)
 
 
 def test_a_model_of_a_joint_or_a_mass_that_cannot_be_is_not_exported(tmp_path: Path) -> None:
     parameters = {"coefficient": {"value": 1.0, "unit": "N.m.s/rad"}}
     component = {"effect": "viscous_friction", "joint": 99, "joints": [1], "parameters": parameters}
     path = write_model(tmp_path / "joint.yaml", components=[component])
-    assert "joint 99 should be from 1 to 3" in run_refused(tmp_path, "export-model", path, tmp_path / "x.xml")
+    assert "joint 99 should be from 1 to 3" in run_refused(tmp_path, "model", "export", path, tmp_path / "x.xml")
     path = write_model(tmp_path / "mass.yaml", links=[LINK | {"mass": 1e307}, LINK, LINK])
-    assert "link 1 has 1e+307" in run_refused(tmp_path, "export-model", path, tmp_path / "x.xml")
+    assert "link 1 has 1e+307" in run_refused(tmp_path, "model", "export", path, tmp_path / "x.xml")
 
 
 def test_an_export_never_replaces_the_robot_that_the_model_is_made_from(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(urdf(3))
     path = write_model(tmp_path / "model.yaml", robot="arm.urdf")
-    message = run_refused(tmp_path, "export-model", path, tmp_path / "arm.urdf")
+    message = run_refused(tmp_path, "model", "export", path, tmp_path / "arm.urdf")
     assert "arm.urdf is there already: choose another name" in message
 
 
@@ -284,9 +284,9 @@ def test_an_algorithm_that_writes_into_what_it_is_told_changes_no_result() -> No
     assert best(Scribbler) == best(RandomSearch) > 0
 
 
-@pytest.mark.parametrize("command", ["conceal", "prove", "real-concealed"])
-def test_no_processes_are_refused(command: str, tmp_path: Path) -> None:
-    result = CliRunner().invoke(main, [command, "--jobs", "0"])
+@pytest.mark.parametrize("command", [["conceal"], ["proof", "run"], ["proof", "real-concealed"]])
+def test_no_processes_are_refused(command: list[str], tmp_path: Path) -> None:
+    result = CliRunner().invoke(main, [*command, "--jobs", "0"])
     assert result.exit_code == 2
     assert "0 processes do nothing" in result.output
 
@@ -296,5 +296,5 @@ def test_ctrl_c_ends_any_command_with_one_line(monkeypatch: pytest.MonkeyPatch) 
         raise KeyboardInterrupt
 
     monkeypatch.setattr("bench.studies.best_known.search.improve_best_known", interrupted)
-    result = CliRunner().invoke(main, ["best-known"])
+    result = CliRunner().invoke(main, ["bench", "best-known"])
     assert (result.exit_code, result.stdout, result.stderr) == (130, "", "armlab: stopped\n")

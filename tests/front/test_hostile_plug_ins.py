@@ -104,7 +104,9 @@ def experiment(tmp_path, **more):
     return path
 
 
-@pytest.mark.parametrize("command", [["run", "mine.yaml"], ["check", "de"], ["base", "irb120-arm"], ["tuning"]])
+@pytest.mark.parametrize(
+    "command", [["run", "mine.yaml"], ["check", "de"], ["model", "base-parameters", "irb120-arm"], ["tools", "tuning"]]
+)
 def test_a_command_that_names_no_plug_in_imports_none(command, site, armlab, tmp_path):
     imported = tmp_path / "imported"
     text = f"open({str(imported)!r}, 'w').close(); import os; os._exit(7)"

@@ -87,14 +87,14 @@ def test_json_and_quiet_may_stand_before_the_command(folder):
     after = told("recording", "check", folder, "--json")
     assert told("--json", "recording", "check", folder) == after
     assert json.loads(after[1])["refused"] == []
-    assert told("--quiet", "list") == (0, "", "")
-    assert told("--json", "--quiet", "list") == told("list", "--json")
+    assert told("--quiet", "bench", "list") == (0, "", "")
+    assert told("--json", "--quiet", "bench", "list") == told("bench", "list", "--json")
 
 
 def test_a_command_without_a_document_refuses_json_before_its_name_too():
-    status, out, err = told("--json", "prove")
+    status, out, err = told("--json", "proof", "run")
     assert (status, out) == (2, "")
-    assert "Usage: main prove" in err
+    assert "Usage: main proof run" in err
     assert "No such option" in err
 
 
@@ -112,11 +112,11 @@ def test_the_harness_answers_in_json(here):
     ran = document("run", "mine.yaml", "--workers", 1)["experiments"][0]
     assert ran["tables"]["mine.csv"][0]["algorithm"] == "de"
     assert all(Path(file).is_file() for file in ran["files"])
-    assert document("compare", "mine.yaml", "mine.yaml")["comparisons"][0]["change"] == "="
-    shared = document("share", "mine.yaml", "--as", "latex", "--out", "tex")
+    assert document("bench", "compare", "mine.yaml", "mine.yaml")["comparisons"][0]["change"] == "="
+    shared = document("bench", "share", "mine.yaml", "--as", "latex", "--out", "tex")
     assert Path(shared["files"][0]).read_text().startswith(r"\begin{tabular}{lrrrrrrrr}")
-    assert "spso" in document("list")["algorithms"]
-    assert len(document("base", "irb120-arm")["sums"]) == 15
+    assert "spso" in document("bench", "list")["algorithms"]
+    assert len(document("model", "base-parameters", "irb120-arm")["sums"]) == 15
 
 
 def test_identification_and_prediction_answer_in_json(folder):

@@ -10,8 +10,9 @@ import yaml
 from click.testing import CliRunner
 from simulated_arm import RATE_HZ, arm, run, structure, truth
 
-from armlab.cli.diagnosis import export_model, real
-from armlab.cli.identification import coverage, identify, predict
+from armlab.cli.identification import identify, predict
+from armlab.cli.model import export_model
+from armlab.cli.proof_real import coverage, real
 from armlab.common.errors import InputError
 from armlab.common.report.wording import format_number
 from armlab.effects.parameters import ParameterValue

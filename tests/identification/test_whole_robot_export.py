@@ -169,9 +169,11 @@ def test_the_whole_robot_of_a_locked_file_that_lock_joints_wrote_is_found(tmp_pa
     source, locked, again = tmp_path / "a--b.urdf", tmp_path / "new" / "arm.urdf", tmp_path / "new" / "less.urdf"
     source.write_text(GRIPPER_URDF)
     locked.parent.mkdir()
-    run = CliRunner().invoke(main, ["lock-joints", str(source), str(locked), "--tip", "hand", "--lock", "finger1=0.03"])
+    run = CliRunner().invoke(
+        main, ["model", "lock-joints", str(source), str(locked), "--tip", "hand", "--lock", "finger1=0.03"]
+    )
     assert run.exit_code == 0, run.output
-    run = CliRunner().invoke(main, ["lock-joints", str(locked), str(again), "--lock", "joint1=-0.5"])
+    run = CliRunner().invoke(main, ["model", "lock-joints", str(locked), str(again), "--lock", "joint1=-0.5"])
     assert run.exit_code == 0, run.output
     record = read_lock_record(again)
     assert record is not None
@@ -179,7 +181,7 @@ def test_the_whole_robot_of_a_locked_file_that_lock_joints_wrote_is_found(tmp_pa
     assert record.positions == pytest.approx({"finger1": 0.03, "finger2": 0.6, "joint1": -0.5})
     assert again.read_text().count("armlab: locked joints") == 1
     model = model_of(again)
-    command = ["export-model", str(model), str(tmp_path / "whole.urdf")]
+    command = ["model", "export", str(model), str(tmp_path / "whole.urdf")]
     source.rename(tmp_path / "elsewhere.urdf")
     run = CliRunner().invoke(main, command)
     assert run.exit_code == 2

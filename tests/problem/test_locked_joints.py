@@ -95,14 +95,16 @@ def test_the_written_file_is_the_arm_and_its_meshes_are_found(urdf: Path, tmp_pa
     urdf.write_text(GRIPPER_URDF.replace("</robot>", '<x filename="m/a.stl"/><x filename="package://b.stl"/></robot>'))
     new = tmp_path / "elsewhere" / "arm.urdf"
     new.parent.mkdir()
-    result = CliRunner().invoke(main, ["lock-joints", str(urdf), str(new), "--tip", "hand", "--lock", "finger2=0.2"])
+    result = CliRunner().invoke(
+        main, ["model", "lock-joints", str(urdf), str(new), "--tip", "hand", "--lock", "finger2=0.2"]
+    )
     assert result.exit_code == 0, result.output
     assert "3 moving joints; locked: finger2 at 0.2, finger1 at 0.01" in result.output
     assert all(word in new.read_text() for word in ('"../m/a.stl"', '"package://b.stl"'))
     arm, motion = load_arm(str(new)), some_motion(3)
     expected = lock_joints(urdf, "hand", {"finger1": 0.01}, tmp_path).arm
     np.testing.assert_allclose(rigid_body_torque(arm, motion), rigid_body_torque(expected, motion))
-    again = CliRunner().invoke(main, ["lock-joints", str(urdf), str(new), "--tip", "hand"])
+    again = CliRunner().invoke(main, ["model", "lock-joints", str(urdf), str(new), "--tip", "hand"])
     assert again.exit_code == 2
     assert "is there already: choose another name" in again.output
 

@@ -156,7 +156,7 @@ def test_the_command_removes_its_own_folder_and_none_of_the_user(
     monkeypatch.setattr(f"{page}.simulate_case", lambda plan: plan)
     monkeypatch.setattr(f"{page}.ask_oracle", lambda plan, _: [replace(ANSWER, case=plan.name)])
     work = tmp_path / ("mine" if given else ".armlab/oracle/1003")
-    words = ["oracle", "--cases", "1", "--seed", "1003", "--development", "--jobs", "1", "--out", "out"]
+    words = ["proof", "oracle", "--cases", "1", "--seed", "1003", "--development", "--jobs", "1", "--out", "out"]
     result = CliRunner().invoke(main, words + (["--work", str(work)] if given else []))
     assert result.exit_code == 0, result.output
     assert (tmp_path / "out" / "oracle.md").exists()

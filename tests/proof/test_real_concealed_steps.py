@@ -92,6 +92,6 @@ def test_random_cases_are_made_diagnosed_and_judged_and_go_on_after_an_interrupt
     [(["--make", "a", "--judge", "b"], "give one of them"), (["--judge", "b"], "--judge needs --seed")],
 )
 def test_steps_that_cannot_be_done_are_refused(options: list[str], complaint: str) -> None:
-    refused = CliRunner().invoke(main, ["real-concealed", *options])
+    refused = CliRunner().invoke(main, ["proof", "real-concealed", *options])
     assert refused.exit_code == 2
     assert complaint in refused.output

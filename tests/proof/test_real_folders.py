@@ -1,4 +1,4 @@
-"""`armlab real` over folders, with a stand-in for the command that diagnoses."""
+"""`armlab proof real` over folders, with a stand-in for the command that diagnoses."""
 
 import sys
 from pathlib import Path
@@ -167,6 +167,6 @@ def test_options_that_do_not_fit_are_refused_in_one_line(
     arguments: list[str], message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv(LOCAL_COPIES_VARIABLE, raising=False)
-    done = CliRunner().invoke(main, ["real", *arguments])
+    done = CliRunner().invoke(main, ["proof", "real", *arguments])
     assert done.exit_code == 2
     assert message in done.output

@@ -124,8 +124,8 @@ def test_recordings_that_are_not_on_this_machine_are_left_out(asked: list[list[s
     assert "kuka-kr300 is left out: it is neither in the folder ARMLAB_RECORDINGS nor in the cache" in lines
     made, *diagnosed, judged = asked
     for arguments in (made, judged):
-        assert arguments[:7] == ["real-concealed", "--only", "emps", "--seed", "1001", "--cases", "2"]
-    assert [arguments[:2] for arguments in diagnosed] == [["real-concealed", "--observation"]] * 3
+        assert arguments[:8] == ["proof", "real-concealed", "--only", "emps", "--seed", "1001", "--cases", "2"]
+    assert [arguments[:3] for arguments in diagnosed] == [["proof", "real-concealed", "--observation"]] * 3
     assert not any(str(tmp_path / "work") in word for arguments in diagnosed for word in arguments)
     names = {path.name for path in (tmp_path / "results").iterdir()}
     assert names == {"real.md", "cases.csv", "claims.csv", "recordings.csv", "reliability.svg", "strength.svg"}
@@ -161,5 +161,7 @@ def test_a_judged_score_is_logged_once_and_others_never(asked: list[list[str]], 
 
 
 def test_a_command_that_fails_says_why() -> None:
-    with pytest.raises(InputError, match=r"armlab real-concealed: .*unknown recording 'epms': did you mean 'emps'"):
-        list(proving._run_command(["real-concealed", "--only", "epms", "--seed", "1001"]))
+    with pytest.raises(
+        InputError, match=r"armlab proof real-concealed: .*unknown recording 'epms': did you mean 'emps'"
+    ):
+        list(proving._run_command(["proof", "real-concealed", "--only", "epms", "--seed", "1001"]))

@@ -10,8 +10,8 @@ import yaml
 from click.testing import CliRunner
 from made_verdicts import perfect, verdict, write
 
-from armlab.cli.proof import conceal as conceal_command
-from armlab.cli.proof import score as score_command
+from armlab.cli.concealed import conceal as conceal_command
+from armlab.cli.concealed import score as score_command
 from armlab.common.errors import InputError
 from armlab.proof.blind.formats import SetManifest, Truth, read_model
 from armlab.proof.blind.noise import JUDGED_KINDS, USUAL_KINDS

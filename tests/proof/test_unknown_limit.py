@@ -55,7 +55,7 @@ def test_a_set_is_checked_with_the_limit_of_the_others(tmp_path: Path) -> None:
 
 def test_the_command_writes_the_limit_and_its_page(tmp_path: Path) -> None:
     paths = [str(claims_file(tmp_path, name, 3, 1)) for name in "abc"]
-    command = ["calibrate-unknown", "--claims", paths[0], "--claims", paths[1], "--check", paths[2]]
+    command = ["proof", "calibrate-unknown", "--claims", paths[0], "--claims", paths[1], "--check", paths[2]]
     done = CliRunner().invoke(main, [*command, "--out", str(tmp_path / "out")])
     assert done.exit_code == 0, done.output
     assert "6 of 8 sure findings without a name were right: limit 0.70" in done.output
@@ -80,7 +80,9 @@ def test_what_is_no_table_of_claims_is_refused_in_one_line(content: str | None, 
     path = tmp_path / "claims.csv"
     if content is not None:
         path.write_text(content, encoding="utf-8")
-    done = CliRunner().invoke(main, ["calibrate-unknown", "--claims", str(path), "--out", str(tmp_path / "out")])
+    done = CliRunner().invoke(
+        main, ["proof", "calibrate-unknown", "--claims", str(path), "--out", str(tmp_path / "out")]
+    )
     assert done.exit_code != 0
     assert said in done.output
     assert len(done.output.strip().splitlines()) == 1
@@ -89,7 +91,9 @@ def test_what_is_no_table_of_claims_is_refused_in_one_line(content: str | None, 
 
 def test_one_set_cannot_be_left_out(tmp_path: Path) -> None:
     path = claims_file(tmp_path, "a", 3, 1)
-    done = CliRunner().invoke(main, ["calibrate-unknown", "--claims", str(path), "--out", str(tmp_path / "out")])
+    done = CliRunner().invoke(
+        main, ["proof", "calibrate-unknown", "--claims", str(path), "--out", str(tmp_path / "out")]
+    )
     assert "two judged sets or more" in done.output
     assert not (tmp_path / "out").exists()
 

@@ -13,7 +13,7 @@ from public_copies import needs_copies
 from refusals import refusal
 from shipped_schemas import check_against_schema
 
-from armlab.cli.recordings import PUBLIC_RECORDING_NAMES
+from armlab.cli.recording import PUBLIC_RECORDING_NAMES
 from armlab.common.arrays import Array
 from armlab.recordings.differentiate import Signals, differentiate
 from armlab.recordings.load import load_recording

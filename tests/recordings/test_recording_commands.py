@@ -10,14 +10,14 @@ from click.testing import CliRunner, Result
 from recording_folders import folder_with, frame
 from refusals import refusal
 
-from armlab.cli.recordings import recording
+from armlab.cli.main import main
 from armlab.common.documents import FailedResultError
 from armlab.recordings.load import load_recording
 from armlab.recordings.public import LOCAL_COPIES_VARIABLE, local_copies
 
 
 def call(*words: object) -> Result:
-    return CliRunner().invoke(recording, [str(word) for word in words])
+    return CliRunner().invoke(main, ["recording", *(str(word) for word in words)])
 
 
 def test_check_prints_each_finding_in_a_line_and_writes_one_page_with_pictures(tmp_path: Path) -> None:
@@ -97,8 +97,7 @@ def test_fetch_names_source_and_licence(tmp_path: Path) -> None:
 
 def test_the_commands_import_nothing_heavy_before_they_run() -> None:
     code = (
-        "import sys, armlab.cli.recordings; print(sorted({'numpy', 'scipy', 'matplotlib', 'pandas'} & "
-        "set(sys.modules)))"
+        "import sys, armlab.cli.recording; print(sorted({'numpy', 'scipy', 'matplotlib', 'pandas'} & set(sys.modules)))"
     )
     path = os.pathsep.join(sys.path)
     done = subprocess.run(

@@ -9,7 +9,7 @@ from recording_folders import SETTINGS, folder_with, frame
 from refusals import refusal
 from shipped_schemas import check_against_schema
 
-from armlab.cli.recordings import ASKED_SIGNALS, OPTIONAL_SIGNALS
+from armlab.cli.recording import ASKED_SIGNALS, OPTIONAL_SIGNALS
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import SIGNALS
 from armlab.recordings.recording_file import FILE_NAME, Columns

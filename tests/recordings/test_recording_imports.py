@@ -225,7 +225,7 @@ def test_a_recording_of_a_robot_with_a_gripper_holds_a_robot_file_of_its_arm(tmp
     imported = import_files([path], tmp_path / "recording", {**options, "tip": "hand", "lock": ("finger1=0.02",)})
     assert any("locked: finger1 at 0.02, finger2 at 0.4" in line for line in imported.lines)
     whole = tmp_path / "recording" / "whole-toy.urdf"
-    assert f"{whole}: the whole robot, for `armlab export-model`" in imported.lines
+    assert f"{whole}: the whole robot, for `armlab model export`" in imported.lines
     assert imported.document["whole_robot"] == whole
     shutil.move(tmp_path / "recording", tmp_path / "elsewhere")
     (tmp_path / "toy.urdf").unlink()

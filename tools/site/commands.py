@@ -1,12 +1,12 @@
-"""Pages of the commands, one a command: what it does, its arguments and its options, as the command line has them."""
+"""Pages of the commands and nouns of the first screen: what each does, with arguments and options."""
 
 import inspect
 import re
 from collections.abc import Iterator
-from importlib import import_module
 
 import click
 
+from armlab.cli.commands import CommandTable
 from armlab.cli.main import main
 from armlab.common.markdown import markdown_page, markdown_table
 from tools.site.pages import Pages, toctree
@@ -18,42 +18,31 @@ a check or a trial fails, and 130 after Ctrl-C."""
 
 
 def command_pages() -> Pages:
-    """Path and text of each page: an index, and a page a command; a group of commands has one page."""
+    """Path and text of each page: an index, and a page for each command of the first screen and for each noun."""
     context = click.Context(main, info_name="armlab")
-    places: dict[str, list[click.Command]] = {}
-    for name in main.list_commands(context):
-        command = main.get_command(context, name)
-        assert command is not None
-        if not command.hidden:
-            places.setdefault(_module(command), []).append(command)
-    pages: Pages = {}
+    assert isinstance(main, CommandTable)
     parts = [INTRODUCTION]
-    names = []
-    for module, commands in places.items():
-        heading = inspect.getdoc(import_module(module)) or module
-        rows = [(f"[`armlab {each.name}`]({each.name}.md)", each.get_short_help_str(limit=200)) for each in commands]
-        parts += [
-            f"## {_heading(module)}",
-            heading.split(":")[0].split("\n")[0],
-            markdown_table(("command", "does"), rows),
-        ]
-        for each in commands:
-            names.append(str(each.name))
-            pages[f"reference/commands/{each.name}.md"] = _page(each, context)
-    pages["reference/commands/index.md"] = markdown_page("Commands", *parts, toctree(names, hidden=True))
-    return pages
+    for title, names in main.sections.items():
+        parts += [f"## {title}", _table([_command(main, context, name) for name in names])]
+    commands = [_command(main, context, name) for name in main.places]
+    pages = {f"reference/commands/{each.name}.md": _page(each, context) for each in commands}
+    index = markdown_page("Commands", *parts, toctree(list(main.places), hidden=True))
+    return pages | {"reference/commands/index.md": index}
 
 
-def _module(command: click.Command) -> str:
-    """Where its code stands: of a group, that of its first command."""
-    if isinstance(command, click.Group):
-        return _module(next(iter(command.commands.values())))
-    return inspect.unwrap(command.callback).__module__ if command.callback else main.__module__
+def _command(table: CommandTable, context: click.Context, name: str) -> click.Command:
+    command = table.get_command(context, name)
+    assert command is not None
+    return command
 
 
-def _heading(module: str) -> str:
-    words = module.rsplit(".", 1)[-1].replace("_", " ")
-    return words[0].upper() + words[1:]
+def _table(commands: list[click.Command]) -> str:
+    """Commands with links to their pages; the commands of a noun stand beside it."""
+    rows = []
+    for each in commands:
+        inside = f" {', '.join(f'`{name}`' for name in each.places)}." if isinstance(each, CommandTable) else ""
+        rows.append((f"[`armlab {each.name}`]({each.name}.md)", each.get_short_help_str(limit=200) + inside))
+    return markdown_table(("command", "does"), rows)
 
 
 def _page(command: click.Command, parent: click.Context) -> str:
@@ -69,9 +58,9 @@ def _sections(command: click.Command, parent: click.Context, level: int) -> Iter
     yield f"```text\n{context.command_path} {usage}\n```"
     records = [record for each in command.get_params(context) if (record := each.get_help_record(context))]
     yield markdown_table(("argument or option", "meaning"), [(f"`{names}`", _escape(text)) for names, text in records])
-    if isinstance(command, click.Group):
-        for each in command.commands.values():
-            yield from _sections(each, context, level + 1)
+    if isinstance(command, CommandTable):
+        for name in command.places:
+            yield from _sections(_command(command, context, name), context, level + 1)
 
 
 def _markdown_help(text: str) -> str:

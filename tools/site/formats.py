@@ -25,10 +25,10 @@ TITLES = {
 FIRST_LINES = {
     "recording": "A recording is a folder with this file and its runs: [recordings](../recordings.md) has an example.",
     "robot": "An arm by D-H parameters: [the problem](../problem.md) has an example. A URDF or an MJCF serves, too.",
-    "model": "Written by `identify` and `diagnose`; `predict`, `diagnose` and `export-model` read it.",
+    "model": "Written by `identify` and `diagnose`; `predict`, `diagnose` and `model export` read it.",
     "verdict": "Written by `diagnose`. [Diagnosis](../diagnosis.md) says how it is found.",
     "comparison": "Written by `diagnose --compare`. [Changes](../changes.md) says how it is found.",
-    "facts": "What is known of recordings, for `armlab real --facts`: [recordings](../recordings.md) has an example.",
+    "facts": "What is known of recordings, for `proof real --facts`: [recordings](../recordings.md) has an example.",
 }
 OTHER_PAGES = ("commands/index", "configuration", "parameters", "python")
 

@@ -12,7 +12,7 @@ from armlab.proof.blind.score.measures import MEASURE_TEXTS
 LOG_FILE, LOG_PAGE = "log.jsonl", "log.md"
 HOW_TO_READ = """\
 Every judged run of the proof, the latest first: a value, and the number of items that it was counted on. The seed of a
-run follows from its commit (`armlab prove`). A star stands at a commit beside which files were changed. The real
+run follows from its commit (`armlab proof run`). A star stands at a commit beside which files were changed. The real
 recordings are the same in each run, what is concealed in them is not. A cell is empty where the program of that day
 did not count the measure. Some definitions have changed since. What was decided after looks at a judged run stands in
 `docs/diagnosis.md` and `docs/proof.md`."""

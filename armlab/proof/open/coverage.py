@@ -1,6 +1,6 @@
 """How often 95 % intervals hold the truth: simulated experiments with noise of several colours on both sides.
 
-Each experiment passes the whole chain of filters; `armlab coverage` writes what `measure_coverage` returns.
+Each experiment passes the whole chain of filters; `armlab proof coverage` writes what `measure_coverage` returns.
 """
 
 from collections.abc import Generator

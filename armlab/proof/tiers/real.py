@@ -1,5 +1,5 @@
-"""The tier of real recordings: `armlab real-concealed` makes, diagnoses and judges random cases, each in a step of its
-own, and its tables are scored here.
+"""The tier of real recordings: `armlab proof real-concealed` makes, diagnoses and judges random cases, each in a step
+of its own, and its tables are scored here.
 
 The cases follow from the seed and the recordings alone, and the seed of a judged proof from the commit, so that nobody
 has seen them before.
@@ -90,7 +90,7 @@ def prove_real(settings: RealSet, work: Path, results: Path, jobs: int, commit: 
             place = work.resolve()
             made, fetched = str(place / DRAFTS / MADE), str(place / "recordings")
             folders = ["--make", made, "--recordings", fetched, "--results", str(LOOKS_FOLDER)]
-            yield from _run_command(["real-concealed", *own.options, *folders])
+            yield from _run_command(["proof", "real-concealed", *own.options, *folders])
     yield from REAL.prove(chosen, work, results, jobs, commit)
 
 
@@ -102,13 +102,13 @@ def _make(case: RealCase, draft: Path) -> None:
 
 
 def _question(_: RealCase, observation: Path) -> list[str]:
-    return ["real-concealed", "--observation", str(observation)]
+    return ["proof", "real-concealed", "--observation", str(observation)]
 
 
 def _judge(settings: RealSet, work: Path, results: Path) -> Score:
     tables = (work / "tables").resolve()
     judging = ["--judge", str(work.resolve()), "--out", str(tables)]
-    lines = list(_run_command(["real-concealed", *settings.options, *judging]))
+    lines = list(_run_command(["proof", "real-concealed", *settings.options, *judging]))
     scored = read_tables(tables)
     lines += [f"wrote {path}" for path in write_score(settings.seed, scored, results)]
     measures = real_measures(scored)
@@ -139,6 +139,6 @@ def _run_command(arguments: Sequence[str]) -> Iterator[str]:
             if running.wait():
                 errors.seek(0)
                 complaint = [line.strip() for line in errors if line.strip()] or ["no error output"]
-                raise InputError(f"armlab {arguments[0]}: {complaint[-1]}")
+                raise InputError(f"armlab {' '.join(arguments[:2])}: {complaint[-1]}")
         finally:
             running.kill()

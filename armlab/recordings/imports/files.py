@@ -41,7 +41,7 @@ class ImportedRecording:
     @property
     def lines(self) -> list[str]:
         """How each file was read, what each signal was taken from, and what to do next."""
-        whole = f"{self.whole_robot}: the whole robot, for `armlab export-model`"
+        whole = f"{self.whole_robot}: the whole robot, for `armlab model export`"
         return [
             *(f"{name}: {text}" for name, text in describe_plan(self.plan)),
             *(f"{file}: repaired: {text}" for file, text in self.repairs),

@@ -1,4 +1,4 @@
-"""The tuning numbers of the reading of a recording, with the bound that `armlab calibrate-reading` learns."""
+"""The tuning numbers of the reading of a recording, with the bound that `armlab proof calibrate-reading` learns."""
 
 import json
 from dataclasses import dataclass
@@ -112,7 +112,7 @@ class ReadingTuning:
         learnt_bound(),
         unit="nats",
         meaning="what a mistake that is named has to explain beyond chance",
-        source="the best wrong readings of real arms: armlab calibrate-reading",
+        source="the best wrong readings of real arms: armlab proof calibrate-reading",
     )
     sure_deviations: float = tuned(
         2.0,

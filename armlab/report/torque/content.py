@@ -282,7 +282,7 @@ def _export_text(diagnosis: Diagnosis) -> str:
         return "It has base parameters, which simulators do not take: they need nominal `links` to start from."
     missing = dict.fromkeys(claim.effect for claim in diagnosis.claims if not _has_place_in_simulator(claim))
     lost = f" That has no place for {join_words([effect_in_words(each) for each in missing])}." if missing else ""
-    return f"Where a simulator needs it: `armlab export-model model.yaml model.xml` writes MJCF.{lost}"
+    return f"Where a simulator needs it: `armlab model export model.yaml model.xml` writes MJCF.{lost}"
 
 
 def _has_place_in_simulator(claim: Claim) -> bool:

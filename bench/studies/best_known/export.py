@@ -1,4 +1,4 @@
-"""`armlab export`: the trajectory of a record, checked at the controller's rate, as a file."""
+"""`armlab bench export`: the trajectory of a record, checked at the controller's rate, as a file."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Trajectories that others have published with their coefficients, judged as the records are: `armlab published`."""
+"""`armlab bench published`: trajectories that others published with their coefficients, judged as the records are."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -118,7 +118,7 @@ def judge_published(config: Path, plan: Path, records: Path) -> tuple[dict[str, 
             settings[trajectory.same_family[columns]] = family.settings(trajectory.same_family[columns])
     known = known_values(settings, records)
     if missing := sorted(settings.keys() - known.keys()):
-        raise InputError(f"{records}: has no record of '{missing[0]}'; `armlab best-known` makes it")
+        raise InputError(f"{records}: has no record of '{missing[0]}'; `armlab bench best-known` makes it")
     return trajectories, [
         _judge(trajectory, name, columns, build_excitation(settings[problem], name), known)
         for name, trajectory in trajectories.items()

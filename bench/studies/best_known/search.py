@@ -1,4 +1,4 @@
-"""The search for better trajectories, `armlab best-known`.
+"""The search for better trajectories, `armlab bench best-known`.
 
 Each start is a random point, the end of a CMA-ES run or a perturbation of the best known; the records are written after
 each start.

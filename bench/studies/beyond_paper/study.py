@@ -1,4 +1,4 @@
-"""`armlab study`: runs the missing trials of its experiments and writes tables, figures and one page over all."""
+"""`armlab paper study`: runs the missing trials of its experiments and writes tables, figures and one page over all."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

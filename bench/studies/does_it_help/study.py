@@ -1,4 +1,4 @@
-"""`armlab does-it-help`: make the trajectories, identify from each, write tables, figures and page."""
+"""`armlab paper does-it-help`: make the trajectories, identify from each, write tables, figures and page."""
 
 from collections.abc import Sequence
 from pathlib import Path

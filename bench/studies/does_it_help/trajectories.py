@@ -46,7 +46,7 @@ class Specimen:
 def make_specimens(seed: int, records: dict[str, Record]) -> list[Specimen]:
     """All specimens, each feasible and different from the others; raises InputError without a record to start from."""
     if BEST_RECORD not in records:
-        raise InputError(f"there is no best-known record of '{BEST_RECORD}': make one with `armlab best-known`")
+        raise InputError(f"there is no best-known record of '{BEST_RECORD}': make one with `armlab bench best-known`")
     problem = build_excitation(parse_problem(PROBLEM_SETTINGS, "does-it-help"), "does-it-help")
     best = record_point(records[BEST_RECORD])
     found = [

@@ -43,7 +43,7 @@ def choice_page(sources: Sources) -> str:
     """The whole page."""
     return markdown_page(
         "Which optimiser should I take?",
-        "<!-- Written by `armlab landscape` from the files in results/: do not edit. -->",
+        "<!-- Written by `armlab bench landscape` from the files in results/: do not edit. -->",
         *_short_answer(sources),
         _READING,
         *_plain_section(sources),

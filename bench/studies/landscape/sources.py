@@ -67,11 +67,11 @@ class Comparison:
 
 
 def _read_prices(path: Path) -> dict[str, dict[str, float]]:
-    """Of `armlab speed`; raises InputError where there is no such file."""
+    """Of `armlab tools speed`; raises InputError where there is no such file."""
     try:
         found: dict[str, dict[str, float]] = json.loads(path.read_text())["derivative_price"]
     except (OSError, ValueError, KeyError) as error:
-        raise InputError(f"cannot read {path}, which `armlab speed` writes: {error}".splitlines()[0]) from None
+        raise InputError(f"cannot read {path}, which `armlab tools speed` writes: {error}".splitlines()[0]) from None
     return {name: price for name, price in found.items() if "," not in name}
 
 

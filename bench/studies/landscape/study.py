@@ -1,4 +1,4 @@
-"""`armlab landscape`: measures what is missing, correlates, and writes tables, figure and both pages."""
+"""`armlab bench landscape`: measures what is missing, correlates, and writes tables, figure and both pages."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
@@ -82,7 +82,7 @@ def _read_texts(out: Path) -> dict[str, str]:
     names = (FEATURES_FILE, ENDS_FILE, SETTINGS_FILE)
     for name in names:
         if not (out / name).is_file():
-            raise InputError(f"{out / name}: there is no such file; `armlab landscape` without --pages makes it")
+            raise InputError(f"{out / name}: there is no such file; `armlab bench landscape` without --pages makes it")
     return {name: (out / name).read_text(encoding="utf-8") for name in names}
 
 
@@ -91,7 +91,7 @@ def _parse_effort(text: str) -> Effort:
     try:
         return Effort(SamplingSettings(**content.pop("sampling")), **content)
     except (AttributeError, KeyError, TypeError):
-        raise InputError(f"{SETTINGS_FILE}: is not as `armlab landscape` writes it") from None
+        raise InputError(f"{SETTINGS_FILE}: is not as `armlab bench landscape` writes it") from None
 
 
 def _check_problems(features: pd.DataFrame, problems: list[str]) -> None:

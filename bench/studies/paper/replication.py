@@ -1,4 +1,4 @@
-"""`armlab paper`: all tables and figures of the paper and the replication report, in one folder."""
+"""`armlab paper replication`: all tables and figures of the paper and the replication report, in one folder."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -51,8 +51,8 @@ def make_paper(configs: Path, options: RunOptions, records: Path, bar: ProgressB
     """Run the missing trials and write all files into the results folder; yields the files as they are written.
 
     configs: the folder with one configuration for each table and figure. records: the best known trajectories, in the
-    folder that holds `tune` and `study`, the results of `armlab tune` and `armlab study`. Raises the errors of
-    `run_experiment`.
+    folder that holds `tune` and `study`, the results of `armlab bench tune` and `armlab paper study`. Raises the errors
+    of `run_experiment`.
     """
     items = _read_items(configs)
     tuned = read_tuned_evidence(records.parent / "tune", records.parent / "study")

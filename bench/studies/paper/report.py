@@ -89,7 +89,7 @@ _VERDICT_RULES = f"""\
 **Reproduced**: our number agrees with the printed one within {PRINTED_TOLERANCE:.0%}, or the statement holds for our
 runs (for statements about the printed numbers themselves: it follows from them). **Not reproduced**: the statement does
 not hold, or the printed number is outside of what any convention gives here. **Cannot be checked**: a datum is
-missing, and which. Every number of ours was computed by `armlab paper`; those of the paper stand in
+missing, and which. Every number of ours was computed by `armlab paper replication`; those of the paper stand in
 `bench/printed.yaml`. The default conventions, and which choices the paper leaves open, are in `docs/problem.md`."""
 _RANKING_READING = """\
 Each line is one choice of what the paper leaves open, and there the comparison of Table 3 anew: 30 paired

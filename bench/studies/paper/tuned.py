@@ -1,5 +1,5 @@
 """Table 3 once more, with every algorithm tuned: which claims of the paper hold then, and with which speed limit MuPSO
-would win. Read from the judged runs of `armlab tune` and from the study of MuPSO's ingredients.
+would win. Read from the judged runs of `armlab bench tune` and from the study of MuPSO's ingredients.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -31,7 +31,7 @@ _STATISTICS = ("minimum", "average", "standard_deviation")
 
 @dataclass(frozen=True, eq=False)
 class TunedEvidence:
-    """runs: of `armlab tune`. medians, duels: tables of the study of MuPSO's ingredients."""
+    """runs: of `armlab bench tune`. medians, duels: tables of the study of MuPSO's ingredients."""
 
     runs: JudgedRuns
     medians: pd.DataFrame
@@ -48,13 +48,15 @@ class TunedEvidence:
 
 
 def read_tuned_evidence(tuning: Path, study: Path) -> TunedEvidence:
-    """From the folders of `armlab tune` and `armlab study`; raises InputError, in one line, if a file is missing."""
+    """From the folders of `armlab bench tune` and `armlab paper study`; raises InputError for a missing file."""
     tables = []
     for path in (study / f"{_INGREDIENTS}.csv", study / f"{_INGREDIENTS}_duels.csv"):
         try:
             tables.append(pd.read_csv(path))
         except (OSError, ValueError) as error:
-            raise InputError(f"cannot read {path}, which `armlab study` writes: {error!s}".splitlines()[0]) from None
+            raise InputError(
+                f"cannot read {path}, which `armlab paper study` writes: {error!s}".splitlines()[0]
+            ) from None
     return TunedEvidence(read_judged_runs(tuning), *tables)
 
 

@@ -190,7 +190,7 @@ def _calibration_page(sweep: Sweep, calibration: Calibration) -> str:
         f"{calibration.runs} runs of {sweep.repetitions} repetitions, drawn from {sweep.calibration.repetitions} "
         "trials of unchanged code a cell with a seed of their own, against a baseline of "
         f"{sweep.baseline.repetitions}. "
-        "Written by `armlab regression --calibrate`.",
+        "Written by `armlab tools regression --calibrate`.",
         "## False alarms",
         f"Nominal rate of a whole check: {calibration.rate:g}. Share of runs with any alarm: "
         f"{calibration.false_alarms:.2%} against the committed baseline, "

@@ -92,7 +92,9 @@ def _finite_ends(ends: Array) -> Array:
 
 
 _COLUMN_HEADS = ("problem", "algorithm", "baseline", "now", "best", "now", "p median", "p best", "verdict")
-_ACCEPT_HINT = "If the problem or an algorithm was meant to change, `armlab regression --update-baseline` accepts this."
+_ACCEPT_HINT = (
+    "If the problem or an algorithm was meant to change, `armlab tools regression --update-baseline` accepts this."
+)
 
 
 @dataclass(frozen=True)

@@ -120,7 +120,7 @@ def group_ends(outcomes: Iterable[tuple[Entry, Outcome]]) -> Ends:
 
 
 BASELINE_SCHEMA = "regression-baseline/1"
-_BASELINE_REMEDY = "make it anew with `armlab regression --update-baseline`"
+_BASELINE_REMEDY = "make it anew with `armlab tools regression --update-baseline`"
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The three tasks of `armlab regression`, each as the lines that it prints and an exit code."""
+"""The three tasks of `armlab tools regression`, each as the lines that it prints and an exit code."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""`armlab scale`: measure, and write `scale.md` and `kills.md`."""
+"""`armlab tools scale`: measure, and write `scale.md` and `kills.md`."""
 
 import json
 import os

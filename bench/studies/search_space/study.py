@@ -1,4 +1,4 @@
-"""`armlab search-space`: runs the missing trials of its configuration in both search spaces, and compares them."""
+"""`armlab paper search-space`: runs the missing trials of its configuration in both search spaces, compares them."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path

@@ -159,13 +159,13 @@ def ends_table(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def read_judged_runs(folder: Path, name: str = "tune") -> JudgedRuns:
-    """The judged runs that `armlab tune` wrote into a folder; raises InputError, in one line, if there are none."""
+    """Judged runs that `armlab bench tune` wrote into a folder; raises InputError, in one line, if there are none."""
     path = ends_path(folder, name)
     try:
         frame = pd.read_csv(path)
     except (OSError, ValueError) as error:
-        raise InputError(f"cannot read {path}, which `armlab tune` writes: {error!s}".splitlines()[0]) from None
+        raise InputError(f"cannot read {path}, which `armlab bench tune` writes: {error!s}".splitlines()[0]) from None
     missing = [column for column in _END_COLUMNS if column not in frame]
     if missing:
-        raise InputError(f"{path} lacks the columns {', '.join(missing)}: `armlab tune` writes it anew")
+        raise InputError(f"{path} lacks the columns {', '.join(missing)}: `armlab bench tune` writes it anew")
     return JudgedRuns(read_tuning(settings_path(folder, name)), frame)

@@ -1,4 +1,4 @@
-"""`armlab tune`: tunes every algorithm, judges all on problems that took no part, and writes tables and a page."""
+"""`armlab bench tune`: tunes every algorithm, judges all on problems that took no part, writes tables and a page."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -26,7 +26,7 @@ MOTION_AXES: Final = ("velocity", "position", "acceleration")
 
 @cache
 def calibrated_weights(left_out: str = "") -> Weights:
-    """The weights of what speaks for a name, as they were found on development sets (`armlab calibrate`).
+    """The weights of what speaks for a name, as they were found on development sets (`armlab proof calibrate-names`).
 
     left_out: a public recording whose own cases they do not know.
     """
@@ -37,7 +37,7 @@ def calibrated_weights(left_out: str = "") -> Weights:
 
 @cache
 def unknown_limit() -> float:
-    """How sure a finding may be that it is unknown: as often as such ones were right (`armlab calibrate-unknown`)."""
+    """How sure a finding may be that it is unknown: as often as such ones were right (`proof calibrate-unknown`)."""
     return float(json.loads(files(__package__).joinpath(LIMIT_FILE).read_text(encoding="utf-8"))["limit"])
 
 

@@ -1,4 +1,4 @@
-"""What `armlab real-conditioning` does: every recording window by window, one page, two tables and one picture."""
+"""`armlab proof real-conditioning`: every recording window by window, one page, two tables and one picture."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path

@@ -59,7 +59,7 @@ def bench_real_motion(
         yield f"XL330: {comparison_summary(comparison)}"
     page = markdown_page(
         "Real recordings of motion only",
-        "Made by `armlab real-motion`. Sources and licences: `armlab/recordings/public_motion.py`.",
+        "Made by `armlab proof real-motion`. Sources and licences: `armlab/recordings/public_motion.py`.",
         "## SO-101, public MJCF as the simulation",
         f"Held out: {_held_out(diagnosis)}. Left out before any fit, as contact: {_contact()}. "
         f"{diagnosis.seconds:.0f} s for the diagnosis.",

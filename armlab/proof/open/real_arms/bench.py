@@ -1,4 +1,4 @@
-"""What `armlab real` does: every public recording by one procedure, one page, one table and one picture."""
+"""What `armlab proof real` does: every public recording by one procedure, one page, one table and one picture."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`armlab real --leave-one-out`: are the settings of the diagnosis made for these arms?
+"""`armlab proof real --leave-one-out`: are the settings of the diagnosis made for these arms?
 
 For each arm, settings are chosen on the other arms, by the error on a part of their identification runs that is held
 out; the arm left out judges them on its runs that validate. An outcome is stored as soon as it is there, so that an

@@ -1,7 +1,7 @@
 """Random cases of public recordings: identify, draw, conceal, diagnose and judge; the tables of what came out.
 
-`armlab prove --tier real` scores the tables, and `armlab calibrate --real` learns from the names that were weighed. All
-outcomes are stored, so that an interrupted command continues.
+`armlab proof run --tier real` scores the tables, and `armlab proof calibrate-names --real` learns from the names that
+were weighed. All outcomes are stored, so that an interrupted command continues.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""What `armlab real` does with recording folders: diagnose each, measure its errors, hold it against facts, report.
+"""`armlab proof real` with recording folders: diagnose each, measure its errors, hold it against facts, report.
 
 Rows about a folder without a licence, or of which nothing is known, stand on a page in the work folder alone.
 """

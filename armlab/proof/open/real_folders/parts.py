@@ -1,4 +1,4 @@
-"""The two parts of `armlab real`: recording folders, which are asked most, and the public recordings."""
+"""The two parts of `armlab proof real`: recording folders, which are asked most, and the public recordings."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

@@ -94,7 +94,7 @@ def relations_page(outcomes: Sequence[Outcome]) -> str:
         rows.append((relation, *("–" if each is None else ANSWERS[each.holds] for each in own)))
     intro = (
         "Relations that hold whatever is true of the robot, so that no answer is needed to check them "
-        "(`armlab relations`). A broken one is a fault of the diagnosis or of the comparison."
+        "(`armlab proof relations`). A broken one is a fault of the diagnosis or of the comparison."
     )
     parts = [markdown_table(("relation", *recordings), rows), count_null_pairs(outcomes), "## Details"]
     details = [(each.recording, each.relation, ANSWERS[each.holds], each.detail) for each in outcomes]

@@ -36,12 +36,7 @@ OPTIONAL_SIGNALS = (
 )
 
 
-@click.group()
-def recording() -> None:
-    """Import, check and fetch recordings of robot arms."""
-
-
-@recording.command()
+@click.command()
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--out", type=PagePath(), help="HTML file to write [default: NAME-check.html].")
 @prints_result
@@ -65,7 +60,7 @@ def check(folder: Path, out: Path | None) -> ResultLines:
     return document
 
 
-@recording.command()
+@click.command()
 @click.argument("name", metavar="NAME", type=click.Choice((*PUBLIC_RECORDING_NAMES, *PUBLIC_MOTION_NAMES)))
 @click.option("--out", type=OutputPath(), help="New folder for the recording [default: NAME].")
 @prints_result
@@ -86,7 +81,7 @@ def fetch(name: str, out: Path | None) -> ResultLines:
     return {"recording": folder, "source": public.source, "licence": public.licence}
 
 
-@recording.command()
+@click.command()
 @click.argument("folder", type=OutputPath())
 def example(folder: Path) -> None:
     """Write the log of a simulated arm, to try the commands.
@@ -106,7 +101,7 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
-@recording.command("import")
+@click.command()
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--robot", help="Built-in robot, or path of a robot file.")
 @tip_option
