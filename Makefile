@@ -58,7 +58,7 @@ search-space: .venv/run ## what a search space within all limits does for each a
 tune: .venv/dev ## every algorithm tuned with the same budget, judged on problems that took no part: results/tune/
 	$(BIN)/armlab bench tune --overwrite
 
-landscape: .venv/run ## what makes an algorithm win, and which optimiser to take: results/landscape/, docs/which-optimiser.md
+landscape: .venv/run ## what makes an algorithm win, and which optimiser to take: results/landscape/
 	$(BIN)/armlab bench landscape
 
 best-known: .venv/run ## ten minutes more for the best trajectories known: results/best_known.json
@@ -89,7 +89,7 @@ prove: .venv/dev ## hide effects, diagnose blindly, score, all judged and logged
 prove-quick: .venv/dev ## the same with a few cases of each tier, of a development seed, not logged
 	$(BIN)/armlab proof run --quick --results .armlab/proof-quick
 
-speed: .venv/dev ## how fast, beside Pinocchio, CasADi, mealpy, pygmo and scipy: results/speed.json and .md
+speed: .venv/dev ## how fast, beside Pinocchio, CasADi, mealpy, pygmo and scipy: results/speed/
 	$(BIN)/armlab tools speed
 
 # --- documentation

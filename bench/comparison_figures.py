@@ -42,7 +42,7 @@ def draw_ends(
     """Every end of each algorithm, with median, quartiles and the best known as a line; a panel a problem.
 
     frame: tidy, one swarm size and budget. known: best values by problem. figures: what a problem's value is, by
-    problem, the condition number if left out. PNG and SVG bytes.
+    problem, the condition number if left out. SVG bytes.
     """
     problems = [str(problem) for problem in frame["problem"].unique()]
     labels = [str(label) for label in frame["algorithm"].unique()]
@@ -114,7 +114,7 @@ def draw_ranking(frame: pd.DataFrame, formats: Sequence[str] = FORMATS) -> dict[
     """Rank of each algorithm in every problem, its average, and the groups that no test tells apart.
 
     frame: tidy. The ranks are those of medians over problems or, of too few problems or a single one, those of ends
-    over the repetitions. PNG and SVG bytes.
+    over the repetitions. SVG bytes.
     """
     cells = ["problem", "swarm_size", "budget"]
     by_cell = [log_losses(rows) for _, rows in frame.groupby(cells, sort=False)]

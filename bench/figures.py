@@ -34,6 +34,8 @@ _STYLES: tuple[tuple[str, str | tuple[int, tuple[int, ...]], str], ...] = (
     (palette.MAGENTA, (0, (5, 1)), "h"),
 )
 DrawPanels = Callable[[Sequence[Axes]], None]
+FORMATS = ("svg",)
+BITMAP = ("png",)  # where an SVG is larger, or the committed picture cannot be drawn again
 
 
 class LineStyle(NamedTuple):
@@ -49,8 +51,8 @@ def line_style(index: int) -> LineStyle:
     return LineStyle(*_STYLES[index % len(_STYLES)])
 
 
-def render_panels(panels: int, draw: DrawPanels) -> dict[str, bytes]:
-    """PNG and SVG bytes of a figure with a row of panels, which `draw` fills, and a legend below."""
+def render_panels(panels: int, draw: DrawPanels, formats: Sequence[str] = FORMATS) -> dict[str, bytes]:
+    """Bytes, by format, of a figure with a row of panels, which `draw` fills, and a legend below."""
 
     def fill(figure: Figure) -> None:
         axes = list(figure.subplots(1, panels, squeeze=False, sharey=True)[0])
@@ -58,10 +60,7 @@ def render_panels(panels: int, draw: DrawPanels) -> dict[str, bytes]:
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=4 * panels - 2)
 
-    return render_figure((2 + 3.6 * panels, 3.8), fill)
-
-
-FORMATS = ("png", "svg")
+    return render_figure((2 + 3.6 * panels, 3.8), fill, formats)
 
 
 def render_figure(
@@ -111,7 +110,7 @@ _SWARM_SIZE_LABEL = "swarm size (particles)"
 
 
 def draw_cost(table: pd.DataFrame, value: str) -> dict[str, bytes]:
-    """Median with quartiles, and minimum, of the repetitions, from a summary table; PNG and SVG bytes.
+    """Median with quartiles, and minimum, of the repetitions, from a summary table; SVG bytes.
 
     value: what the problem's value is.
     """
@@ -130,7 +129,7 @@ def draw_cost(table: pd.DataFrame, value: str) -> dict[str, bytes]:
 
 
 def draw_times(times: pd.DataFrame) -> dict[str, bytes]:
-    """Computing time of a run, average and standard deviation, from a table of times; PNG and SVG bytes."""
+    """Computing time of a run, average and standard deviation, from a table of times; PNG bytes."""
 
     def draw(axes: Sequence[Axes]) -> None:
         for index, (label, rows) in enumerate(times.groupby("algorithm", sort=False)):
@@ -147,7 +146,7 @@ def draw_times(times: pd.DataFrame) -> dict[str, bytes]:
         axes[0].set(xlabel=_SWARM_SIZE_LABEL, ylabel="computing time of a run on one core (s)")
         axes[0].set_ylim(bottom=0)
 
-    return render_panels(1, draw)
+    return render_panels(1, draw, BITMAP)
 
 
 _CONVERGENCE_PANELS = {
@@ -159,7 +158,7 @@ _CONVERGENCE_PANELS = {
 
 
 def draw_convergence(table: pd.DataFrame) -> dict[str, bytes]:
-    """Best so far and present best from a convergence table, medians above and averages below; PNG and SVG bytes.
+    """Best so far and present best from a convergence table, medians above and averages below; SVG bytes.
 
     Medians count an infeasible point as infinite, and such medians are not drawn. Averages leave such points out, so
     that a best so far may rise where a worse run becomes feasible.

@@ -13,6 +13,13 @@ from armlab.cli.safety_options import safety_options
 from armlab.common.documents import Document, ResultLines, written_files
 
 _RESULTS_OPTION = click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
+_RECORDS_OPTION = click.option(
+    "--records",
+    type=PATH,
+    default=Path("results/best_known.json"),
+    show_default=True,
+    help="File of the best known trajectories.",
+)
 
 
 @click.command()
@@ -89,19 +96,13 @@ def share(results: Path, store: Path, form: str, out: Path) -> ResultLines:
 @click.argument("results", type=PATH)
 @store_option
 @click.option("--out", type=PATH, required=True, help="Folder to write into.")
-@click.option(
-    "--records",
-    type=PATH,
-    default=Path("results/best_known.json"),
-    show_default=True,
-    help="File of the best known trajectories.",
-)
+@_RECORDS_OPTION
 @click.option(
     "--as",
     "formats",
     type=click.Choice(["png", "svg", "pdf"]),
     multiple=True,
-    default=("png", "svg"),
+    default=("svg",),
     show_default=True,
     help="Repeatable.",
 )
@@ -200,7 +201,7 @@ def tune(
 
 @click.command()
 @click.argument("algorithms", nargs=-1)
-@click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
+@click.option("--results", type=OutputPath(), default=Path("results/properties"), show_default=True)
 @prints_result
 def properties(algorithms: tuple[str, ...], results: Path) -> ResultLines:
     """Measure general properties of ALGORITHMS [default: all].
@@ -215,13 +216,6 @@ def properties(algorithms: tuple[str, ...], results: Path) -> ResultLines:
 
 @click.command()
 @click.option("--out", type=OutputPath(), default=Path("results/landscape"), show_default=True, help="Folder to write.")
-@click.option(
-    "--page",
-    type=OutputPath(),
-    default=Path("docs/which-optimiser.md"),
-    show_default=True,
-    help="File of the page that says which optimiser to take.",
-)
 @click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core].")
 @click.option(
     "--store",
@@ -233,7 +227,7 @@ def properties(algorithms: tuple[str, ...], results: Path) -> ResultLines:
 @click.option("--pages", is_flag=True, help="Measure nothing: new pages from the tables in --out.")
 @_RESULTS_OPTION
 @prints_result
-def landscape(out: Path, page: Path, workers: int | None, store: Path, pages: bool, results: Path) -> ResultLines:
+def landscape(out: Path, workers: int | None, store: Path, pages: bool, results: Path) -> ResultLines:
     """Say what makes an algorithm win, and which to take.
 
     Measures features of each problem of the suites, correlates them with the standings of the algorithms in --results,
@@ -244,7 +238,7 @@ def landscape(out: Path, page: Path, workers: int | None, store: Path, pages: bo
 
     from bench.studies.landscape.study import LandscapeOptions, make_landscape
 
-    options = LandscapeOptions(results, out, page, store, workers or cpu_count(), pages)
+    options = LandscapeOptions(results, out, store, workers or cpu_count(), pages)
     return written_files(make_landscape(options, trial_bar))
 
 
@@ -264,16 +258,17 @@ def best_known(minutes: float, problem: str | None, results: Path) -> Iterator[s
 
 
 @click.command()
-@_RESULTS_OPTION
+@_RECORDS_OPTION
+@click.option("--results", type=OutputPath(), default=Path("results/published"), show_default=True)
 @prints_result
-def published(results: Path) -> ResultLines:
+def published(records: Path, results: Path) -> ResultLines:
     """Judge published trajectories beside the best known.
 
     Recomputes the condition numbers of the trajectories in configs/published.yaml and writes published.md.
     """
     from bench.studies.best_known.published import write_published
 
-    return written_files(write_published(results))
+    return written_files(write_published(results, records))
 
 
 @click.command()

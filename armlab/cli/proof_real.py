@@ -197,7 +197,7 @@ def relations(
 @click.command()
 @click.option("--experiments", type=click.IntRange(min=10), default=1000, show_default=True)
 @click.option("--seed", type=int, default=0, show_default=True)
-@click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
+@click.option("--results", type=OutputPath(), default=Path("results/coverage"), show_default=True)
 @click.option(
     "--part",
     type=click.Choice(["all", "identification", "superiority"]),

@@ -50,7 +50,7 @@ def tuning(out: Path | None) -> ResultLines:
 @click.option("--calibrate", "task", flag_value="calibrate", help="Compute false-alarm rate and power (minutes).")
 @click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core].")
 @click.option("--config", type=click.Path(path_type=Path), default=Path("configs/regression.yaml"), show_default=True)
-@click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
+@click.option("--results", type=OutputPath(), default=Path("results/regression"), show_default=True)
 @click.pass_context
 def regression(context: click.Context, task: str | None, workers: int | None, config: Path, results: Path) -> None:
     """Compare a short fixed sweep with the committed baseline.
@@ -68,7 +68,7 @@ def regression(context: click.Context, task: str | None, workers: int | None, co
 
 
 @click.command()
-@click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
+@click.option("--results", type=OutputPath(), default=Path("results/speed"), show_default=True)
 @prints_result
 def speed(results: Path) -> ResultLines:
     """Measure speed beside that of other packages.
@@ -84,7 +84,7 @@ def speed(results: Path) -> ResultLines:
 @click.command()
 @click.option("--trials", type=click.IntRange(min=1), default=100_000, show_default=True)
 @click.option("--kills", type=click.IntRange(min=1), help="Kill the command and its workers that many times instead.")
-@click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
+@click.option("--results", type=OutputPath(), default=Path("results/speed"), show_default=True)
 @click.pass_context
 def scale(context: click.Context, trials: int, kills: int | None, results: Path) -> None:
     """Measure memory, overhead and efficiency of large sweeps.

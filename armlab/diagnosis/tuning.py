@@ -859,10 +859,10 @@ def _value_text(value: object) -> str:
 
 
 def tuning_page() -> str:
-    """`docs/tuning.md`: all numbers with value, unit, meaning and source."""
+    """All numbers with value, unit, meaning and source."""
     intro = (
-        "Each number that was chosen, by stage of the diagnosis (`armlab/diagnosis/tuning.py`). `armlab tools tuning "
-        "--out docs/tuning.md` writes this page. `armlab diagnose --set noise.max_order=8` takes another value, and "
+        "Each number that was chosen, by stage of the diagnosis (`armlab/diagnosis/tuning.py`). `armlab tools tuning` "
+        "lists them, too. `armlab diagnose --set noise.max_order=8` takes another value, and "
         "`armlab proof ablate --vary noise.max_order=8` measures what that changes."
     )
     parts = []

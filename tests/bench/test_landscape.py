@@ -32,6 +32,7 @@ from bench.studies.landscape.study import LandscapeOptions, make_landscape
 from problem.registry import parse_problem
 
 ROOT = Path(__file__).parents[2]
+PAGES = tuple(ROOT / "results" / "landscape" / name for name in ("landscape.md", "which-optimiser.md"))
 SMALL = {"preset": "joint-fourier", "harmonics": 2, "samples": 40}
 TINY = Effort(SamplingSettings(points=100, distances=50, walks=1, steps=20), gradients=1, descents=2)
 
@@ -242,24 +243,25 @@ def committed(tmp_path: Path) -> LandscapeOptions:
     out.mkdir()
     for name in ("landscape.csv", "landscape_ends.csv", "landscape.settings.yaml"):
         (out / name).write_bytes((ROOT / "results" / "landscape" / name).read_bytes())
-    return LandscapeOptions(ROOT / "results", out, tmp_path / "page.md", tmp_path / "store", 1, pages=True)
+    return LandscapeOptions(ROOT / "results", out, tmp_path / "store", 1, pages=True)
 
 
 def test_the_committed_pages_say_what_the_results_say(tmp_path: Path) -> None:
     """If this fails after a new run of a study: `armlab bench landscape --pages`."""
     options = committed(tmp_path)
     written = list(make_landscape(options, silent_bar))
-    assert len(written) == 8
-    assert options.page.read_text() == (ROOT / "docs" / "which-optimiser.md").read_text()
-    assert (options.out / "landscape.md").read_text() == (ROOT / "results" / "landscape" / "landscape.md").read_text()
+    assert len(written) == 7
+    for page in PAGES:
+        assert (options.out / page.name).read_text() == page.read_text()
 
 
 def test_the_committed_pages_have_a_held_out_answer_for_every_algorithm() -> None:
-    rows = [pd.read_csv(ROOT / "results" / f"{name}.csv").groupby("problem") for name in ("suite", "suite_heldout")]
+    tables = [pd.read_csv(ROOT / "results" / "suite" / name) for name in ("suite.csv", "suite_heldout.csv")]
+    rows = [table.groupby("problem") for table in tables]
     algorithms = [set(each["algorithm"].agg(tuple)) for each in rows]
     assert algorithms[0] == algorithms[1]
     assert len(algorithms[0]) == 1
-    for page in (ROOT / "docs" / "which-optimiser.md", ROOT / "results" / "landscape" / "landscape.md"):
+    for page in PAGES:
         assert not re.search(r"\bnan\b", page.read_text())
 
 
@@ -271,7 +273,8 @@ def test_rows_that_ask_for_derivatives_answer_for_them(
     results = tmp_path / "results"
     for path in (ROOT / "results").rglob("*"):
         if path.suffix in (".csv", ".yaml", ".json") and path.parent.name in (
-            "results",
+            "suite",
+            "speed",
             "derivatives",
             "study",
             "search_space",
@@ -281,13 +284,13 @@ def test_rows_that_ask_for_derivatives_answer_for_them(
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_bytes(path.read_bytes())
     for name in ("suite", "suite_heldout"):
-        table = pd.read_csv(results / f"{name}.csv")
+        table = pd.read_csv(results / "suite" / f"{name}.csv")
         table = table[~table["algorithm"].isin(names_with_derivatives())]
         best = table[table["algorithm"] == "ipop-cma-es"]
         added = best.assign(algorithm="sqp", median=best["median"] / 2)
-        pd.concat([table, added]).to_csv(results / f"{name}.csv", index=False)
+        pd.concat([table, added]).to_csv(results / "suite" / f"{name}.csv", index=False)
     list(make_landscape(replace(options, results=results), silent_bar))
-    page = options.page.read_text()
+    page = (options.out / "which-optimiser.md").read_text()
     assert "**sqp**. On the held-out suite ipop-cma-es ends 2.00 (2.00 to 2.00) times as high." in page
     assert "| sqp | 1.00 | 100% | 24 | 1 |" in page
 

@@ -66,9 +66,8 @@ def test_speed_and_acceleration_are_the_derivatives_of_the_position(name: str) -
 
 
 def test_the_committed_page_says_what_the_records_say(tmp_path: Path) -> None:
-    (tmp_path / RECORDS_FILE).write_text(RECORDS.read_text())
-    (page,) = write_published(tmp_path, CONFIG, PLAN)
-    assert page.read_text() == (ROOT / "results" / PAGE_FILE).read_text()
+    (page,) = write_published(tmp_path / "published", RECORDS, CONFIG, PLAN)
+    assert page.read_text() == (ROOT / "results" / "published" / PAGE_FILE).read_text()
 
 
 def test_published_trajectories_keep_the_limits_and_end_above_the_records() -> None:

@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[2]
 @cache
 def committed() -> tuple[Sweep, Baseline, list[Entry]]:
     sweep = read_sweep(ROOT / "configs/regression.yaml")
-    baseline = read_baseline(ROOT / "results/regression_baseline.json", sweep)
+    baseline = read_baseline(ROOT / "results/regression/regression_baseline.json", sweep)
     return sweep, baseline, plan_entries(sweep)
 
 

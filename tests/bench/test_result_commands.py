@@ -38,7 +38,7 @@ def test_share_then_report_and_compare_need_no_store(shell: CliRunner, small_run
     done = shell.invoke(compare, ["tables", "tables"], catch_exceptions=False)
     assert "6 not told apart" in done.output
     done = shell.invoke(draw, ["tables", "--out", "pictures", "--records", "none.json"], catch_exceptions=False)
-    assert "pictures/small_ranking.png" in done.output
+    assert "pictures/small_ranking.svg" in done.output
     assert not (tmp_path / ".armlab").exists()
     done = shell.invoke(draw, ["tables", "--out", "printed", "--records", "none.json", "--as", "pdf"])
     assert done.exit_code == 0

@@ -221,8 +221,9 @@ def test_the_interval_of_superiority_holds_near_one_half_and_near_one() -> None:
 
 
 def test_the_documentation_names_the_least_committed_coverage_of_each_distribution() -> None:
-    text = (Path(__file__).parents[2] / "docs" / "comparing.md").read_text()
-    committed = json.loads((Path(__file__).parents[2] / "results" / "coverage.json").read_text())["superiority"]
+    root = Path(__file__).parents[2]
+    text = (root / "docs" / "comparing.md").read_text()
+    committed = json.loads((root / "results" / "coverage" / "coverage.json").read_text())["superiority"]
     for name, by_repetitions in committed.items():
         least = min(share for by_effect in by_repetitions.values() for share in by_effect.values())
         assert f"{100 * least:.1f} " in text, name

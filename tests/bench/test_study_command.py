@@ -57,8 +57,8 @@ def test_every_experiment_leaves_its_table_its_duels_and_a_section(results: Path
 
 def test_every_picture_of_the_page_is_there(results: Path) -> None:
     for name in ("study_budgets", "study_equal_evaluations", "study_mupso"):
-        assert f"]({name}.png)" in (results / "study.md").read_text()
-        assert (results / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert f"]({name}.svg)" in (results / "study.md").read_text()
+        assert "<svg" in (results / f"{name}.svg").read_text()
 
 
 def test_mutations_are_counted_for_every_variant_of_mupso(results: Path) -> None:

@@ -96,7 +96,7 @@ def test_a_diagnosis_refuses_a_number_that_there_is_not(tmp_path: Path) -> None:
     assert "leave out --set or --compare" in _refusal("diagnose", folder, *out, *old)
 
 
-def test_the_page_of_tuning_numbers_is_up_to_date() -> None:
-    text = (ROOT / "docs" / "tuning.md").read_text(encoding="utf-8")
-    assert text == tuning_page(), "run `armlab tools tuning --out docs/tuning.md`"
-    assert CliRunner().invoke(main, ["tools", "tuning"]).output == text
+def test_the_command_prints_the_page_of_all_tuning_numbers() -> None:
+    told = CliRunner().invoke(main, ["tools", "tuning"])
+    assert (told.exit_code, told.output) == (0, tuning_page())
+    assert all(f"`{each.name}`" in told.output for each in tuning_numbers(Tuning()))

@@ -182,7 +182,7 @@ def test_the_study_writes_page_tables_and_picture_and_logs_its_look(
     lines = list(study.study_conditioning(tmp_path, tmp_path, ["emps"], lambda message: None))
     assert lines[0].startswith("**Windows of 10 of 12 blocks: ")
     written = {path.name for path in tmp_path.iterdir()}
-    assert written >= {PAGE_NAME, TABLE_NAME, CHOICES_NAME, "conditioning.svg", "conditioning.png"}
+    assert written >= {PAGE_NAME, TABLE_NAME, CHOICES_NAME, "conditioning.png"}
     table = pd.read_csv(tmp_path / TABLE_NAME)
     assert len(table) == 2 * 2 * len(CRITERIA)
     question = table[(table["arm"] == MEAN) & (table["criterion"] == "fitted_cond_si")].iloc[0]

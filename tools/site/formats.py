@@ -9,6 +9,7 @@ from typing import Any
 
 from algorithms.registry import load, names, names_with_derivatives
 from armlab.common.markdown import markdown_page, markdown_table
+from armlab.diagnosis.tuning import tuning_page
 from armlab.schemas import FORMATS
 from bench.config import Experiment
 from problem.registry import PRESETS
@@ -30,15 +31,16 @@ FIRST_LINES = {
     "comparison": "Written by `diagnose --compare`. [Changes](../changes.md) says how it is found.",
     "facts": "What is known of recordings, for `proof real --facts`: [recordings](../recordings.md) has an example.",
 }
-OTHER_PAGES = ("commands/index", "configuration", "parameters", "python")
+OTHER_PAGES = ("commands/index", "configuration", "parameters", "python", "tuning")
 
 
 def format_pages() -> Pages:
-    """Path and text of the index of the references and of each page of a format."""
+    """Path and text of the index of the references, of each page of a format, and of keys and numbers."""
     pages: Pages = {f"reference/{name}.md": _format_page(name) for name in FORMATS}
     pages["reference/configuration.md"] = _configuration_page()
     pages["reference/parameters.md"] = _parameters_page()
-    entries = (*OTHER_PAGES, *FORMATS, "../tuning")
+    pages["reference/tuning.md"] = tuning_page()
+    entries = (*OTHER_PAGES, *FORMATS)
     sentence = "All pages of this part are generated from the code of this version. [The glossary](../glossary.md) has "
     sentence += "the words, [the references](../references.md) have the sources."
     pages["reference/index.md"] = markdown_page("Reference", sentence, toctree(entries))

@@ -13,7 +13,7 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_whole
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.settings import Settings, read_yaml, validate
-from bench.studies.best_known.records import RECORDS_FILE, build_excitation, known_values, read_search_plan
+from bench.studies.best_known.records import build_excitation, known_values, read_search_plan
 from bench.studies.best_known.search import CONFIG_FILE as PLAN_FILE
 from problem.excitation import ExcitationProblem
 from problem.fitness import condition_number
@@ -161,9 +161,9 @@ def _limit_use(problem: ExcitationProblem, motion: Motion) -> dict[str, float]:
     return {name: float(np.max(share)) for name, share in use.items()}
 
 
-def write_published(results: Path, config: Path = CONFIG_FILE, plan: Path = PLAN_FILE) -> Iterator[Path]:
-    """Write published.md into the folder `results`, whose records stand beside; yields the file."""
-    trajectories, judgements = judge_published(config, plan, results / RECORDS_FILE)
+def write_published(results: Path, records: Path, config: Path = CONFIG_FILE, plan: Path = PLAN_FILE) -> Iterator[Path]:
+    """Write published.md into the folder `results`, beside the records of a file; yields the file."""
+    trajectories, judgements = judge_published(config, plan, records)
     page = markdown_page(
         "Published trajectories beside the best known",
         _INTRODUCTION,
@@ -171,6 +171,7 @@ def write_published(results: Path, config: Path = CONFIG_FILE, plan: Path = PLAN
         *_notes(trajectories),
         _LOOKED_AT,
     )
+    results.mkdir(parents=True, exist_ok=True)
     write_whole(results / PAGE_FILE, page)
     yield results / PAGE_FILE
 

@@ -43,7 +43,7 @@ def _draw_intervals(axes: Axes, rows: pd.DataFrame) -> None:
 
 
 def draw_swarm_sizes(frame: pd.DataFrame) -> dict[str, bytes]:
-    """Median against swarm size at equal evaluations; PNG and SVG bytes."""
+    """Median against swarm size at equal evaluations; SVG bytes."""
     table = summary_table(frame)
 
     def draw(axes: Sequence[Axes]) -> None:

@@ -134,7 +134,7 @@ def _times_text(parts: Sequence[StudyPart]) -> str:
 
 
 def _part_sections(part: StudyPart) -> list[str]:
-    figure = [f"![{part.text}]({part.name}.png)"] if part.figure else []
+    figure = [f"![{part.text}]({part.name}.svg)"] if part.figure else []
     repetitions = part.frame["repetition"].nunique()
     text = f"{part.text} {repetitions} repetitions; settings: `{part.name}.settings.yaml`."
     return [f"## {part.name}", text, _format_table(part.table), _duels_text(part.duels, repetitions), *figure]

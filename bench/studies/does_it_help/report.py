@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from armlab.common.markdown import markdown_table
-from bench.figures import line_style, render_panels
+from bench.figures import BITMAP, line_style, render_panels
 from bench.studies.does_it_help.identification import (
     COULOMB_FRICTION,
     ENCODER_COUNTS,
@@ -56,7 +56,7 @@ ERROR_NAMES = {
 
 
 def draw_errors(frame: pd.DataFrame) -> dict[str, bytes]:
-    """Error of the predicted torque against each criterion, one point a trajectory; PNG and SVG bytes."""
+    """Error of the predicted torque against each criterion, one point a trajectory; PNG bytes."""
 
     def draw(axes: Sequence[Axes]) -> None:
         for axis, (criterion, name) in zip(axes, CRITERION_NAMES.items(), strict=True):
@@ -76,11 +76,11 @@ def draw_errors(frame: pd.DataFrame) -> dict[str, bytes]:
             axis.set(xlabel=name, yscale="log", xscale="linear" if criterion == "d_optimality" else "log")
         axes[0].set_ylabel("error of the predicted torque,\nroot mean square (N m)")
 
-    return render_panels(len(CRITERION_NAMES), draw)
+    return render_panels(len(CRITERION_NAMES), draw, BITMAP)
 
 
 def draw_correlations(table: pd.DataFrame, subset: str) -> dict[str, bytes]:
-    """Rank correlations of one subset by error, criterion and noise, with their intervals; PNG and SVG bytes."""
+    """Rank correlations of one subset by error, criterion and noise, with their intervals; SVG bytes."""
     chosen = table[table["subset"] == subset]
 
     def draw(axes: Sequence[Axes]) -> None:

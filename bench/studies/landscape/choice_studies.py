@@ -66,7 +66,7 @@ def time_section(sources: Sources) -> Iterator[str]:
         "Time is counted in a fixed unit, an evaluation of the same problem in a population, so that any machine can "
         "repeat it. A point with derivatives takes as long as "
         + ", ".join(f"{price['in_population']:.0f} evaluations on `{name}`" for name, price in sources.prices.items())
-        + " (`results/speed.md`), and counts as "
+        + " (`results/speed/speed.md`), and counts as "
         + ", ".join(f"{price['stated']:.0f}" for price in sources.prices.values())
         + " in the budgets above; `spso-sqp` asks for none in the first half of its budget. Without derivatives: "
         "the budget nearest to that time. The time of the solvers themselves is left out."

@@ -17,7 +17,7 @@ _TEXT_ON_DARK = 0.7  # size of a correlation above which text is white
 
 
 def draw_landscape(features: pd.DataFrame, correlations: pd.DataFrame, ends: pd.DataFrame) -> dict[str, bytes]:
-    """PNG and SVG bytes; tables as `feature_table`, `correlation_table` and `ends_table` make them."""
+    """SVG bytes; tables as `feature_table`, `correlation_table` and `ends_table` make them."""
     landscapes = features.drop_duplicates("landscape").sort_values("dimension", kind="stable")
     algorithms = list(correlations["algorithm"].unique())
 

@@ -99,17 +99,18 @@ class Sources:
         """From the folder of results; raises InputError where one is missing."""
         for path in (results / "search_space" / "comparison.csv", results / "tune" / "tune_judged.csv"):
             if not path.is_file():
-                raise InputError(f"{path}: there are no such results; `armlab {path.parent.name}` makes them")
+                target = path.parent.name.replace("_", "-")
+                raise InputError(f"{path}: there are no such results; `make {target}` makes them")
         return Sources(
-            suite=Comparison.read(results, "suite"),
-            held_out=Comparison.read(results, "suite_heldout"),
+            suite=Comparison.read(results / "suite", "suite"),
+            held_out=Comparison.read(results / "suite", "suite_heldout"),
             derivatives=Comparison.read(results / "derivatives", "derivatives"),
             derivative_budgets=Comparison.read(results / "derivatives", "derivatives_budgets"),
             budgets=Comparison.read(results / "study", "study_budgets"),
             space=Comparison.read(results / "search_space", "search_space"),
             space_duels=pd.read_csv(results / "search_space" / "comparison.csv"),
             tuned=pd.read_csv(results / "tune" / "tune_judged.csv").set_index("algorithm"),
-            prices=_read_prices(results / "speed.json"),
+            prices=_read_prices(results / "speed" / "speed.json"),
             features=features,
             correlations=correlations,
         )

@@ -9,7 +9,7 @@ import pandas as pd
 import yaml
 
 from armlab.common.errors import InputError
-from armlab.common.files import write_texts, write_whole
+from armlab.common.files import write_texts
 from bench.run import ProgressBar
 from bench.studies.best_known.records import RECORDS_FILE
 from bench.studies.landscape.choice import choice_page
@@ -23,12 +23,12 @@ from bench.studies.landscape.standing import correlation_table, standings
 from bench.tables import as_csv
 
 FEATURES_FILE, ENDS_FILE, SETTINGS_FILE = "landscape.csv", "landscape_ends.csv", "landscape.settings.yaml"
-CORRELATIONS_FILE, PAGE_FILE = "landscape_correlations.csv", "landscape.md"
+CORRELATIONS_FILE, PAGE_FILE, CHOICE_FILE = "landscape_correlations.csv", "landscape.md", "which-optimiser.md"
 
 
 @dataclass(frozen=True)
 class LandscapeOptions:
-    """results: folder of the results that are read. out: folder to write into. page: file of the page of the choice.
+    """results: folder of the results that are read. out: folder to write into.
 
     store: folder that keeps what was measured. workers: processes. pages: take features, ends and settings
     from `out` and measure nothing.
@@ -36,7 +36,6 @@ class LandscapeOptions:
 
     results: Path
     out: Path
-    page: Path
     store: Path
     workers: int
     pages: bool = False
@@ -49,22 +48,20 @@ def make_landscape(options: LandscapeOptions, bar: ProgressBar) -> Iterator[Path
     It can be stopped at any time: what was measured is kept, and the same command goes on from there. Raises
     InputError where results are missing, StoppedError.
     """
-    suites = [Comparison.read(options.results, name) for name in ("suite", "suite_heldout")]
+    suites = [Comparison.read(options.results / "suite", name) for name in ("suite", "suite_heldout")]
     measured = _read_texts(options.out) if options.pages else _measure(suites, options, bar)
     features, ends = (pd.read_csv(StringIO(measured[name])) for name in (FEATURES_FILE, ENDS_FILE))
     first, second = (standings(each.table) for each in suites)
     _check_problems(features, [*first.index, *second.index])
     correlations = correlation_table(features, first, second)
-    page = choice_page(Sources.read(options.results, features, correlations))
     texts: dict[str, str | bytes] = {
         **measured,
         CORRELATIONS_FILE: as_csv(correlations),
+        CHOICE_FILE: choice_page(Sources.read(options.results, features, correlations)),
         PAGE_FILE: landscape_page(features, correlations, _parse_effort(measured[SETTINGS_FILE])),
         **{f"{PICTURE_STEM}.{suffix}": image for suffix, image in draw_landscape(features, correlations, ends).items()},
     }
     yield from write_texts(texts, options.out)
-    write_whole(options.page, page)
-    yield options.page
 
 
 def _measure(suites: list[Comparison], options: LandscapeOptions, bar: ProgressBar) -> dict[str, str]:

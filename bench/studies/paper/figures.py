@@ -20,7 +20,7 @@ _ARM_COLOR = palette.DIM
 
 
 def draw_figure4(settings: Figure4Settings, run: BestRun) -> dict[str, bytes]:
-    """The tool point's path with its start, and the arm from base to tool; PNG and SVG bytes."""
+    """The tool point's path with its start, and the arm from base to tool; SVG bytes."""
 
     def fill(figure: Figure) -> None:
         axes: Any = figure.add_subplot(projection="3d")
@@ -57,7 +57,7 @@ _MOTION_LABELS = {"position": "position (deg)", "velocity": "speed (deg/s)", "ac
 
 
 def draw_figure5(settings: TrajectorySettings, run: BestRun) -> dict[str, bytes]:
-    """Positions, speeds and accelerations of the joints over time; PNG and SVG bytes."""
+    """Positions, speeds and accelerations of the joints over time; SVG bytes."""
     times = sample_instants(run.problem.duration, settings.samples)
     motion, limits = run.motion(times), run.problem.constraints.limits
 

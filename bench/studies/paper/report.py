@@ -33,7 +33,8 @@ def markdown_to_html(title: str, text: str, images: Mapping[str, bytes]) -> str:
     for token in tokens:
         for child in token.children or ():
             if child.type == "image":
-                child.attrs["src"] = _data_uri(images[str(child.attrs["src"])])
+                name = str(child.attrs["src"])
+                child.attrs["src"] = _data_uri(name, images[name])
     body = str(parser.renderer.render(tokens, parser.options, {}))
     body = body.replace("<table", '<div class="wide" tabindex="0"><table').replace("</table>", "</table></div>")
     return render_page("bench.studies.paper", "replication.html", title, body=Markup(body))
@@ -59,8 +60,9 @@ def _stack_tables(tokens: Sequence[Token]) -> None:
                 column += 1
 
 
-def _data_uri(image: bytes) -> str:
-    return f"data:image/png;base64,{base64.b64encode(image).decode()}"
+def _data_uri(name: str, image: bytes) -> str:
+    kind = "svg+xml" if name.endswith(".svg") else "png"
+    return f"data:image/{kind};base64,{base64.b64encode(image).decode()}"
 
 
 CLAIM_SECTIONS = {
@@ -72,18 +74,18 @@ CLAIM_SECTIONS = {
     "Conclusion": conclusion_claims,
 }
 FIGURE_CAPTIONS = {
-    "figure2.png": "Figure 2: best cost against swarm size, 200 iterations whatever the size.",
+    "figure2.svg": "Figure 2: best cost against swarm size, 200 iterations whatever the size.",
     "figure2_times.png": "Figure 2: computing time against swarm size.",
-    "figure2_equal_evaluations.png": "Figure 2 once more, every swarm size with the same number of evaluations.",
-    "table3.png": "Table 3: every end of every run, with median and quartiles, algorithms as read here; the dashed "
+    "figure2_equal_evaluations.svg": "Figure 2 once more, every swarm size with the same number of evaluations.",
+    "table3.svg": "Table 3: every end of every run, with median and quartiles, algorithms as read here; the dashed "
     "line is the best known.",
-    "ranking.png": "The ranking: each algorithm, as read here, its rank under each choice with feasible ends, and its "
+    "ranking.svg": "The ranking: each algorithm, as read here, its rank under each choice with feasible ends, and its "
     "average.",
-    "figure3.png": "Figure 3: convergence, medians above, where an infeasible point counts as infinite, and the "
+    "figure3.svg": "Figure 3: convergence, medians above, where an infeasible point counts as infinite, and the "
     "paper's averages below, which leave such points out; right, what the algorithm itself holds, which a mutation "
     "forgets.",
-    "figure4.png": "Figure 4: MuPSO's best trajectory of Table 3 in Cartesian space.",
-    "figure5.png": "Figure 5: the same trajectory in joint space.",
+    "figure4.svg": "Figure 4: MuPSO's best trajectory of Table 3 in Cartesian space.",
+    "figure5.svg": "Figure 5: the same trajectory in joint space.",
 }
 _VERDICT_RULES = f"""\
 **Reproduced**: our number agrees with the printed one within {PRINTED_TOLERANCE:.0%}, or the statement holds for our

@@ -1,4 +1,4 @@
-"""The speed report: `results/speed.json` and `results/speed.md`."""
+"""The speed report: `results/speed/speed.json` and `results/speed/speed.md`."""
 
 import json
 from collections.abc import Mapping, Sequence

@@ -62,7 +62,7 @@ def tuning_page(judged: Judgement) -> str:
         "## Medians on the problems that took no part",
         _medians_table(judged),
         *_verdict(judged.runs),
-        f"![Ranks on the judging problems]({settings.name}_ranking.png)",
+        f"![Ranks on the judging problems]({settings.name}_ranking.svg)",
         *_sweep_section(judged.runs),
     ]
     return markdown_page(settings.name, _READING, effort, *sections)

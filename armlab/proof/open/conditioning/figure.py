@@ -34,15 +34,12 @@ SIZE_INCHES = (11.0, 11.0)
 FIRST_POWER = 1e5  # the least tick that is written as a power of ten
 
 
-def conditioning_images(studies: Sequence[ArmStudy], table: pd.DataFrame) -> dict[str, bytes]:
-    """PNG and SVG bytes of the picture, the same for the same numbers."""
-    images = {}
-    for suffix, unsigned in {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}.items():
-        out = BytesIO()
-        with matplotlib.rc_context({"svg.hashsalt": "conditioning", "font.size": 9}):
-            draw_conditioning(studies, table).savefig(out, format=suffix, dpi=130, metadata=unsigned)
-        images[suffix] = out.getvalue()
-    return images
+def conditioning_image(studies: Sequence[ArmStudy], table: pd.DataFrame) -> bytes:
+    """PNG bytes of the picture, whose points are so many that an SVG would be larger; the same for the same numbers."""
+    out = BytesIO()
+    with matplotlib.rc_context({"font.size": 9}):
+        draw_conditioning(studies, table).savefig(out, format="png", dpi=130, metadata={"Software": None})
+    return out.getvalue()
 
 
 def draw_conditioning(studies: Sequence[ArmStudy], table: pd.DataFrame) -> Figure:

@@ -11,11 +11,11 @@ from armlab.proof.open.conditioning.arm import SIMULATIONS, WINDOW_BLOCKS, ArmSt
 from armlab.proof.open.conditioning.correlation import PERMUTATIONS
 from armlab.proof.open.conditioning.windows import BLOCKS
 
-PAGE_NAME, TABLE_NAME, CHOICES_NAME, PICTURE_STEM = (
+PAGE_NAME, TABLE_NAME, CHOICES_NAME, PICTURE_NAME = (
     "conditioning.md",
     "conditioning.csv",
     "conditioning_choices.csv",
-    "conditioning",
+    "conditioning.png",
 )
 SPECTRAL_NAMES = {
     "cond_si": "cond",
@@ -65,7 +65,7 @@ The paper's condition number is that of the links' columns alone. Friction is fi
 
 def conditioning_page(studies: Sequence[ArmStudy], table: pd.DataFrame, choices: pd.DataFrame) -> str:
     """The whole page; every number comes from the tables."""
-    parts = [*answer_lines(table, choices), f"![Errors and rank correlations]({PICTURE_STEM}.svg)", "## What was done"]
+    parts = [*answer_lines(table, choices), f"![Errors and rank correlations]({PICTURE_NAME})", "## What was done"]
     parts += [METHOD_TEXT, setting_table(studies)]
     for blocks in WINDOW_BLOCKS:
         rows = table[table["blocks"] == blocks]

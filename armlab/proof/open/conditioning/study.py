@@ -8,11 +8,11 @@ from armlab.common.files import write_texts
 from armlab.common.settings import suggest_name
 from armlab.proof.open.conditioning.answer import choice_table, correlation_table
 from armlab.proof.open.conditioning.arm import ArmStudy, study_arm
-from armlab.proof.open.conditioning.figure import SHOWN_CRITERIA, conditioning_images
+from armlab.proof.open.conditioning.figure import SHOWN_CRITERIA, conditioning_image
 from armlab.proof.open.conditioning.page import (
     CHOICES_NAME,
     PAGE_NAME,
-    PICTURE_STEM,
+    PICTURE_NAME,
     TABLE_NAME,
     answer_lines,
     conditioning_page,
@@ -51,6 +51,6 @@ def study_conditioning(
         PAGE_NAME: conditioning_page(studies, table, choices),
         TABLE_NAME: table_csv(table),
         CHOICES_NAME: table_csv(choices),
-        **{f"{PICTURE_STEM}.{suffix}": image for suffix, image in conditioning_images(studies, table).items()},
+        PICTURE_NAME: conditioning_image(studies, table),
     }
     yield from map(str, write_texts(texts, results))
