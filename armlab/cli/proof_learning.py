@@ -44,7 +44,7 @@ def calibrate_names(
     """Learn the probabilities of names from concealed sets.
 
     Uses development sets alone, and checks the probabilities on cases that are left out in turn, of real recordings all
-    of one together (extra `dev`).
+    of one together (extra `calibrate`).
     """
     from armlab.diagnosis.torque.names.choice import Example
     from armlab.proof.blind.real.weighed import read_weighed_real
@@ -223,7 +223,7 @@ def likeness(
 
     Makes nulls of the realistic and of the field tier, trains a classifier on features of them and of the real
     recordings below ARMLAB_RECORDINGS, one real arm left out at a time, and writes the area under its curve with both
-    distributions. Each look is logged (extra `dev`).
+    distributions. Each look is logged (extra `calibrate`).
     """
     from armlab.common.errors import InputError
     from armlab.common.files import write_texts

@@ -205,13 +205,6 @@ class MotionTuning:
         meaning="ratio of the error before to that after, or to the encoder's noise, that counts as right",
         least=1.0,
     )
-    widening: float = tuned(
-        2.5,
-        unit="of a standard error",
-        meaning="widens what correlated errors tell of a number: what the law leaves out is no noise",
-        source="125 intervals on a development set: 77 % held with 1.5",
-        least=1.0,
-    )
     class_factor: float = tuned(
         3.0,
         unit="times a standard error",
