@@ -26,7 +26,7 @@ _PATH = click.Path(path_type=Path)
     type=_PATH,
     multiple=True,
     metavar="WORK",
-    help="Folder of `armlab prove-motion --seed SEED`; may be given more than once.",
+    help="Folder of `armlab proof motion --seed SEED`; may be given more than once.",
 )
 @click.option(
     "--real",
@@ -34,7 +34,7 @@ _PATH = click.Path(path_type=Path)
     type=_PATH,
     multiple=True,
     metavar="TABLES",
-    help="Output folder of `armlab real-concealed --seed SEED`; may be given more than once.",
+    help="Output folder of `armlab proof real-concealed --seed SEED`; may be given more than once.",
 )
 @click.option("--out", type=OutputPath(), required=True, help="Folder for calibration.json and calibration.md.")
 @prints_lines

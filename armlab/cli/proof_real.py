@@ -126,7 +126,7 @@ def real_concealed(
 
     Conceals effects in public recordings of real arms, diagnoses them, and compares. Writes concealed.md,
     concealed.csv and concealed.svg; with --seed the tables cases.csv, claims.csv and recordings.csv, which
-    `armlab prove --tier real` scores.
+    `armlab proof run --tier real` scores.
     """
     from armlab.proof.open.real_concealed.at_random import (
         REAL_ARMS,
