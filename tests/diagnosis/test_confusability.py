@@ -134,6 +134,6 @@ def test_the_command_writes_page_tables_and_pictures(tmp_path: Path) -> None:
     names = {each.name for each in (tmp_path / "card").iterdir()}
     assert names == {f"confusability.{ending}" for ending in ("html", "md", "csv", "json")} | {"figures"}
     assert len(list((tmp_path / "card" / "figures").iterdir())) == 6
-    wrong = CliRunner().invoke(main, [*arguments[:3], "--noise", "1", "--noise", "2"])
+    wrong = CliRunner().invoke(main, [*arguments[:4], "--noise", "1", "--noise", "2"])
     assert wrong.exit_code == 2
     assert "takes one number or 3" in wrong.stderr
