@@ -90,6 +90,7 @@ _GROUPS = {
         "doctor": "armlab.cli.maintenance:doctor",
         "salvage": "armlab.cli.harness:salvage",
         "merge": "armlab.cli.harness:merge",
+        "intervals": "armlab.cli.maintenance:intervals",
         "speed": "armlab.cli.maintenance:speed",
         "scale": "armlab.cli.maintenance:scale",
         "regression": "armlab.cli.maintenance:regression",
