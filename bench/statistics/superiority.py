@@ -30,7 +30,8 @@ def superiority(subject: Array, rival: Array) -> tuple[float, float, float]:
     if not len(subject) or not len(rival):
         return 0.5, 0.0, 1.0
     won = np.searchsorted(np.sort(rival), subject, side="right") + np.searchsorted(np.sort(rival), subject, side="left")
-    share = 1.0 - int(won.sum()) / (2 * len(subject) * len(rival))
+    pairs = len(subject) * len(rival)
+    share = (2 * pairs - int(won.sum())) / (2 * pairs)
     return share, *superiority_interval(share, min(len(subject), len(rival)))
 
 
