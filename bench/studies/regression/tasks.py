@@ -7,7 +7,7 @@ from pathlib import Path
 from algorithms.registry import load
 from bench.files import check_folder
 from bench.fingerprint import calls_lapack
-from bench.processor import processor_kernels
+from bench.processor import kernels_text
 from bench.run import ProgressBar
 from bench.studies.regression.check import judge_run
 from bench.studies.regression.sweep import (
@@ -17,7 +17,6 @@ from bench.studies.regression.sweep import (
     plan_entries,
     read_baseline,
     read_part_of_baseline,
-    read_provenance,
     read_sweep,
     run_entries,
     write_baseline,
@@ -52,9 +51,11 @@ class RegressionTasks:
         baseline = read_baseline(self.results / BASELINE_FILE, sweep)
         entries = plan_entries(sweep)
         with self.bar(len(entries), 0) as progress:
-            verdict = judge_run(baseline, run_entries(entries, self.workers, progress.update), sweep.false_alarm_rate)
-        places = describe_processors(sweep, read_provenance(self.results / BASELINE_FILE))
-        return TaskReport([*verdict.lines(), *places], 0 if verdict.passed else 1)
+            now = run_entries(entries, self.workers, progress.update)
+        cells = lapack_cells(sweep)
+        of_other_kernels = {cell for cell in cells if baseline.kernels.get(cell) != kernels_text()}
+        verdict = judge_run(baseline, now, sweep.false_alarm_rate, of_other_kernels)
+        return TaskReport([*verdict.lines(), *describe_kernels(cells, baseline.kernels)], 0 if verdict.passed else 1)
 
     def update_baseline(self) -> TaskReport:
         """Make the baseline anew from the present code, and check that the fixed run passes against it."""
@@ -63,7 +64,9 @@ class RegressionTasks:
         ends, fixed = plan_entries(sweep, sweep.baseline), plan_entries(sweep)
         with self.bar(len(ends) + len(fixed), 0) as progress:
             baseline = Baseline(
-                run_entries(ends, self.workers, progress.update), run_entries(fixed, self.workers, progress.update)
+                run_entries(ends, self.workers, progress.update),
+                run_entries(fixed, self.workers, progress.update),
+                dict.fromkeys(lapack_cells(sweep), kernels_text()),
             )
         path = self.results / BASELINE_FILE
         write_baseline(path, sweep, baseline)
@@ -73,10 +76,17 @@ class RegressionTasks:
     def extend_baseline(self) -> TaskReport:
         """Add the cells that the baseline lacks, and leave those that it has as they are.
 
-        Whether the present code still gives those is what `check` says afterwards.
+        A cell of an algorithm that calls LAPACK counts as lacking where its kernels are not named. Whether the present
+        code still gives the others is what `check` says afterwards.
         """
         sweep, path = read_sweep(self.config), self.results / BASELINE_FILE
-        known, kept = read_part_of_baseline(path, sweep)
+        there, kept = read_part_of_baseline(path, sweep)
+        without_kernels = set(lapack_cells(sweep)) - there.kernels.keys()
+        known = Baseline(
+            {cell: ends for cell, ends in there.ends.items() if cell not in without_kernels},
+            {cell: ends for cell, ends in there.fixed_run.items() if cell not in without_kernels},
+            there.kernels,
+        )
         ends, fixed = (
             [entry for entry in entries if Cell(entry.problem, entry.algorithm) not in known.ends]
             for entries in (plan_entries(sweep, sweep.baseline), plan_entries(sweep))
@@ -88,8 +98,9 @@ class RegressionTasks:
                 run_entries(ends, self.workers, progress.update), run_entries(fixed, self.workers, progress.update)
             )
         samples = ({**known.ends, **added.ends}, {**known.fixed_run, **added.fixed_run})
-        ordered = [{cell: sample[cell] for cell in sweep.cells if cell in sample} for sample in samples]
-        write_baseline(path, sweep, Baseline(*ordered), kept)
+        all_ends, fixed_run = ({cell: sample[cell] for cell in sweep.cells if cell in sample} for sample in samples)
+        new_kernels = {cell: kernels_text() for cell in lapack_cells(sweep) if cell in added.ends}
+        write_baseline(path, sweep, Baseline(all_ends, fixed_run, known.kernels | new_kernels), kept)
         return TaskReport([f"wrote {path}: {len(added.ends)} cells are new, {len(known.ends)} as they were"])
 
     def calibrate(self) -> TaskReport:
@@ -108,14 +119,20 @@ class RegressionTasks:
         return TaskReport([f"wrote {path}" for path in write_calibration(self.results, sweep, calibration)])
 
 
-def describe_processors(sweep: Sweep, recorded: Mapping[str, str]) -> list[str]:
-    """For which kernels the cells of algorithms that call LAPACK hold, here and in the baseline, in words."""
-    names = [choice.name for choice in sweep.algorithms if calls_lapack(load(choice.name))]
-    if not names:
-        return []
-    here = processor_kernels()
-    there = recorded.get("blas_kernels", "kernels that it does not name")
+def lapack_cells(sweep: Sweep) -> list[Cell]:
+    """The cells of algorithms that call LAPACK, so that the kernels of BLAS decide their last digits and their path."""
+    callers = {choice.label or choice.name for choice in sweep.algorithms if calls_lapack(load(choice.name))}
+    return [cell for cell in sweep.cells if cell.algorithm in callers]
+
+
+def describe_kernels(cells: Sequence[Cell], recorded: Mapping[Cell, str]) -> list[str]:
+    """For which kernels the cells that call LAPACK hold, here and in the baseline, in words."""
+    here = kernels_text()
+    by_kernels: dict[str, list[str]] = {}
+    for cell in cells:
+        by_kernels.setdefault(recorded.get(cell, "kernels that it does not name"), []).append(str(cell.algorithm))
     return [
-        f"{', '.join(names)} call LAPACK: their cells are of {here['blas_kernels']} ({here['simd']}); the baseline is "
-        f"of {recorded.get('processor')}, {there}. Other kernels give other ends of the same distribution."
+        f"Cells of {', '.join(dict.fromkeys(names))} call LAPACK: here they are of {here}, "
+        + ("as those of the baseline." if there == here else f"those of the baseline of {there}.")
+        for there, names in by_kernels.items()
     ]
