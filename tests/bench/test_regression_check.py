@@ -122,7 +122,9 @@ def test_cells_that_call_lapack_say_their_kernels_and_are_compared_as_distributi
     )
 
 
-def test_a_cell_that_calls_lapack_and_names_no_kernels_is_made_anew(config: Path) -> None:
+def test_a_cell_without_kernels_gets_these_where_its_fixed_run_comes_out_the_same_else_it_is_made_anew(
+    config: Path,
+) -> None:
     config.write_text(SWEEP.replace("[spso, de]", "[spso, cma-es]"))
     task = regression(config)
     task.update_baseline()
@@ -130,6 +132,12 @@ def test_a_cell_that_calls_lapack_and_names_no_kernels_is_made_anew(config: Path
     named = json.loads(path.read_text())["cells"]
     path.write_text(path.read_text().replace(f', "kernels": "{kernels_text()}"', ""))
     assert task.check().lines[-1].endswith("those of the baseline of kernels that it does not name.")
+    assert task.extend_baseline().lines[0].endswith("0 cells are new, 2 as they were")
+    assert json.loads(path.read_text())["cells"] == named
+    other = json.loads(path.read_text())
+    del other["cells"][1]["kernels"]
+    other["cells"][1]["fixed_run"][0] *= 1.001
+    path.write_text(json.dumps(other))
     assert task.extend_baseline().lines[0].endswith("1 cells are new, 1 as they were")
     assert json.loads(path.read_text())["cells"] == named
 
