@@ -23,6 +23,11 @@ def processor_kernels() -> dict[str, str]:
     }
 
 
+def kernels_text() -> str:
+    """The kernels of BLAS and the SIMD level, in words."""
+    return "{blas_kernels} ({simd})".format(**processor_kernels())
+
+
 def blas_threads() -> int:
     """Threads of the linear algebra of this process; the most of any library."""
     return max((int(pool["num_threads"]) for pool in _blas_pools()), default=1)

@@ -165,6 +165,7 @@ _NOUNS: Mapping[str, tuple[str, Sections]] = {
             "Commands": {
                 "tuning": "armlab.cli.tools:tuning",
                 "regression": "armlab.cli.tools:regression",
+                "intervals": "armlab.cli.tools:intervals",
                 "speed": "armlab.cli.tools:speed",
                 "scale": "armlab.cli.tools:scale",
             },

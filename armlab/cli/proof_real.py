@@ -214,13 +214,14 @@ def coverage(experiments: int, seed: int, results: Path, part: str) -> Iterator[
     """
     from armlab.common.files import write_texts
     from armlab.proof.open.coverage import measure_coverage
-    from bench.statistics.superiority import describe_coverage, superiority_coverage
+    from bench.statistics.superiority import COVERAGE_SIMULATIONS, describe_coverage, superiority_coverage
 
     path = results / "coverage.json"
     found = json.loads(path.read_text()) if part != "all" and path.exists() else {}
     if part != "superiority":
         found |= yield from measure_coverage(experiments, seed)
     if part != "identification":
-        found["superiority"] = superiority_coverage()
-        yield from describe_coverage(found["superiority"])
+        held = superiority_coverage(seed)
+        found["superiority"] = {"seed": seed, "simulations": COVERAGE_SIMULATIONS, "coverage": held}
+        yield from describe_coverage(held)
     yield from map(str, write_texts({path.name: json.dumps(found, indent=2, allow_nan=False) + "\n"}, results))

@@ -82,6 +82,20 @@ def speed(results: Path) -> ResultLines:
 
 
 @click.command()
+@click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
+@prints_result
+def intervals(results: Path) -> ResultLines:
+    """Compute the intervals of A12 in written results anew.
+
+    From A12 and the number of runs, which is all they need: after a change of the method no trial has to be run.
+    Rewrites the tables, and the pages and figures beside them that show intervals.
+    """
+    from bench.studies.intervals import renew_intervals
+
+    return written_files(renew_intervals(results))
+
+
+@click.command()
 @click.option("--trials", type=click.IntRange(min=1), default=100_000, show_default=True)
 @click.option("--kills", type=click.IntRange(min=1), help="Kill the command and its workers that many times instead.")
 @click.option("--results", type=OutputPath(), default=Path("results/speed"), show_default=True)

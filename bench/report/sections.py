@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import yaml
 
-from algorithms.registry import BrokenAlgorithmError, UnknownAlgorithmError, load
+from algorithms.registry import BrokenAlgorithmError, UnknownAlgorithmError, is_our_code, load
 from armlab.common.report.page import Table
 from armlab.common.report.wording import count_of
 from bench.fingerprint import calls_lapack
@@ -273,7 +273,9 @@ def origin_part(results: ResultSet) -> Origin:
         "the last digits differ"
     )
     lapack = [label for label, entry in settings["algorithms"].items() if _calls_lapack(entry["name"])]
-    text += f", and the whole path of {join_words(lapack)}, which call LAPACK." if lapack else "."
+    assumed = [label for label in lapack if not is_our_code(settings["algorithms"][label]["name"])]
+    text += f", and where LAPACK is called the whole path: {join_words(lapack)}" if lapack else ""
+    text += f" (assumed of {join_words(assumed)}, code of another package)." if assumed else "."
     steps = (
         f"armlab run {results.name}.yaml\narmlab report {results.name}.yaml\n"
         f"armlab bench share {results.name}.yaml --as csv --out {results.name}_tables"

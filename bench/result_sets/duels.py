@@ -36,20 +36,22 @@ def write_duels(where: Path, store: Path, subject: str, folder: Path) -> list[Pa
         raise InputError(f"{results.name} has no algorithm beside '{subject}': a duel needs two")
     table = subject_duels_table(results.trials, subject)
     stem = f"{results.name}_{file_name(subject)}_duels"
+    repetitions = results.trials["repetition"].nunique()
     make_folder(folder)
-    files = {f"{stem}.csv": as_csv(table), f"{stem}.md": _duels_page(results.name, subject, table, results.trials)}
+    files = {f"{stem}.csv": as_csv(table), f"{stem}.md": duels_page(results.name, subject, table, repetitions)}
     for name, content in files.items():
         write_whole(folder / name, content)
     return [folder / name for name in files]
 
 
-def _duels_page(name: str, subject: str, table: pd.DataFrame, trials: pd.DataFrame) -> str:
+def duels_page(name: str, subject: str, table: pd.DataFrame, repetitions: int) -> str:
+    """The table that `subject_duels_table` gives, as a Markdown page."""
     shown = display_name(subject)
     left_over = f"not told apart, of {len(table.groupby(CELL_COLUMNS))}"
     return markdown_page(
         f"{name}: {shown} against every other",
         _READING.format(subject=shown),
-        f"{power_text(trials['repetition'].nunique(), table['rival'].nunique())}.",
+        f"{power_text(repetitions, table['rival'].nunique())}.",
         markdown_table(
             ["against", "better", "worse", left_over, "A12, median", "least", "largest"],
             _totals(table),

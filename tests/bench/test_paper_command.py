@@ -112,6 +112,21 @@ def test_the_ranking_leaves_out_the_choice_that_no_algorithm_can_meet(folder: Pa
     assert "rank (1: best) in 3 repetitions" in (folder / "ranking.svg").read_text()
 
 
+def test_the_page_has_three_readings_and_the_two_programs_alone(folder: Path) -> None:
+    text = (folder / "replication.md").read_text().partition("## Three readings")[2].partition("## ")[0]
+    lines = [
+        line for line in text.splitlines() if line.startswith(("| as here", "| the sources", "| their", "| the au"))
+    ]
+    assert [line.split("|")[1].strip() for line in lines[:4]] == [
+        "as here",
+        "the sources' text as printed",
+        "their authors' programs",
+        "the authors' programs of WOA and GOA alone",
+    ]
+    counts = [[int(cell) for cell in line.split("|")[2:5]] for line in lines[:4]]
+    assert {sum(row) for row in counts} == {5}  # one usable convention, five rivals
+
+
 def test_the_page_says_which_claims_hold_when_every_algorithm_is_tuned(folder: Path) -> None:
     text = (folder / "replication.md").read_text()
     assert "## Table 3, tuned" in text

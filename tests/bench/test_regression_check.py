@@ -11,6 +11,7 @@ import pytest
 
 from armlab.common.errors import InputError
 from bench.execute import run_trial
+from bench.processor import kernels_text
 from bench.studies.regression.check import judge_run
 from bench.studies.regression.defects import DEFECTS
 from bench.studies.regression.sweep import (
@@ -96,6 +97,49 @@ def test_a_baseline_gets_the_cells_that_it_lacks_and_keeps_the_others_to_the_dig
     config.write_text(config.read_text().replace("seed: 2}", "seed: 7}"))
     with pytest.raises(InputError, match="was made with another 'baseline'"):
         task.extend_baseline()
+
+
+def test_cells_that_call_lapack_say_their_kernels_and_are_compared_as_distributions_on_others(config: Path) -> None:
+    config.write_text(SWEEP.replace("[spso, de]", "[spso, cma-es]"))
+    task = regression(config)
+    task.update_baseline()
+    path = task.results / BASELINE_FILE
+    here = kernels_text()
+    assert [cell.get("kernels") for cell in json.loads(path.read_text())["cells"]] == [None, here]
+    report = task.check()
+    assert report.lines[-2].endswith("2 of 2 cells are identical to the baseline's own fixed run.")
+    assert report.lines[-1] == f"Cells of cma-es call LAPACK: here they are of {here}, as those of the baseline."
+    path.write_text(path.read_text().replace(here, "openblas 0.1 Prescott (X86_V1)"))
+    report = task.check()
+    assert report.exit_code == 0
+    assert report.lines[-2].endswith(
+        "1 of 1 cells are identical to the baseline's own fixed run, "
+        "1 of other kernels were compared as distributions alone."
+    )
+    assert report.lines[-1] == (
+        f"Cells of cma-es call LAPACK: here they are of {here}, "
+        "those of the baseline of openblas 0.1 Prescott (X86_V1)."
+    )
+
+
+def test_a_cell_without_kernels_gets_these_where_its_fixed_run_comes_out_the_same_else_it_is_made_anew(
+    config: Path,
+) -> None:
+    config.write_text(SWEEP.replace("[spso, de]", "[spso, cma-es]"))
+    task = regression(config)
+    task.update_baseline()
+    path = task.results / BASELINE_FILE
+    named = json.loads(path.read_text())["cells"]
+    path.write_text(path.read_text().replace(f', "kernels": "{kernels_text()}"', ""))
+    assert task.check().lines[-1].endswith("those of the baseline of kernels that it does not name.")
+    assert task.extend_baseline().lines[0].endswith("0 cells are new, 2 as they were")
+    assert json.loads(path.read_text())["cells"] == named
+    other = json.loads(path.read_text())
+    del other["cells"][1]["kernels"]
+    other["cells"][1]["fixed_run"][0] *= 1.001
+    path.write_text(json.dumps(other))
+    assert task.extend_baseline().lines[0].endswith("1 cells are new, 1 as they were")
+    assert json.loads(path.read_text())["cells"] == named
 
 
 def test_a_defect_fails_the_check_with_its_algorithm_named(config: Path) -> None:

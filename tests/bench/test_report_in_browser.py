@@ -2,13 +2,16 @@
 
 import shutil
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 from small_results import ran
 
 from bench.report.page import write_report
+from bench.result_sets.formats import share_results
 
 playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -98,6 +101,32 @@ def test_values_can_be_read_with_the_mouse_and_with_the_keyboard(page: Any) -> N
     page.keyboard.press("ArrowLeft")
     assert figure.locator(".readout").inner_text() != first
     assert first.startswith("evaluations ")
+
+
+def test_the_page_of_an_algorithm_without_a_feasible_point_has_no_error(browser: Any, tmp_path: Path) -> None:
+    small = ran(tmp_path)
+    share_results(small.config, small.store, "csv", tmp_path / "tables")
+    for table in ("trials.csv", "curves.csv"):
+        rows = pd.read_csv(tmp_path / "tables" / table)
+        rows.loc[rows["algorithm"] == "spso", "violation"] = 1.0
+        rows.to_csv(tmp_path / "tables" / table, index=False)
+    list(write_report(tmp_path / "tables", small.store, tmp_path / "page.html"))
+    page, complaints = _opened(browser, (tmp_path / "page.html").as_uri(), 1200)
+    assert lines(page, "convergence") == 3
+    assert complaints == []
+    page.close()
+
+
+def test_labels_of_an_axis_do_not_run_into_each_other(browser: Any, tmp_path: Path) -> None:
+    sphere = "name: wide\nproblem: {preset: sphere, dimension: 3}\nalgorithms: [l-shade, spso, random-search]\n"
+    small = ran(tmp_path, sphere + "swarm_size: 10\niterations: 300\nrepetitions: 5\nseed: 1\n")
+    list(write_report(*small, tmp_path / "page.html"))
+    page, _ = _opened(browser, (tmp_path / "page.html").as_uri(), 360)
+    labels = page.locator('figure[data-chart="ends"] text[text-anchor="middle"]').all()[:-1]  # the last is the axis's
+    edges = [(box["x"], box["x"] + box["width"]) for box in (label.bounding_box() for label in labels)]
+    assert len(edges) > 2
+    assert all(right < left for (_, right), (left, _) in pairwise(edges))
+    page.close()
 
 
 def test_every_picture_says_in_words_what_it_shows(page: Any) -> None:

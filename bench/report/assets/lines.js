@@ -14,7 +14,7 @@ function band(chart, xs, low, high) {
   const known = xs.map((x, k) => [x, low[k], high[k]]).filter(([, a, b]) => a !== null && b !== null);
   const there = known.map(([x, , b]) => [chart.toX(x), chart.toY(b)]);
   const back = known.map(([x, a]) => [chart.toX(x), chart.toY(a)]).reverse();
-  return path([...there, ...back]) + "Z";
+  return known.length ? path([...there, ...back]) + "Z" : "";
 }
 
 function drawLines(figure, chartOf) {

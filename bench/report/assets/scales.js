@@ -52,6 +52,8 @@ function make(name, attributes, parent, text) {
   return element;
 }
 
+const HALF_LETTER_PX = 3.8; // of the labels of an axis, with some space between them
+
 // An empty chart in a figure: title, frame, ticks and labels; returns the drawing and both scales.
 function frame(figure, title, words, x, y) {
   const width = Math.max(280, Math.min(figure.clientWidth || 640, 900));
@@ -69,9 +71,13 @@ function frame(figure, title, words, x, y) {
     make("line", { class: "grid", x1: box.left, x2: box.right, y1: toY(value), y2: toY(value) }, svg);
     make("text", { x: box.left - 6, y: toY(value) + 4, "text-anchor": "end" }, svg, written(value));
   }
+  let taken = -Infinity; // right end of the last label: one that would run into it is left out
   for (const value of x.ticks || ticks(x)) {
     make("line", { class: "grid", x1: toX(value), x2: toX(value), y1: box.top, y2: box.bottom }, svg);
+    const half = written(value).length * HALF_LETTER_PX;
+    if (toX(value) - half < taken) continue;
     make("text", { x: toX(value), y: box.bottom + 16, "text-anchor": "middle" }, svg, written(value));
+    taken = toX(value) + half;
   }
   make("text", { x: (box.left + box.right) / 2, y: height - 4, "text-anchor": "middle" }, svg, x.label);
   return { svg, box, toX, toY };

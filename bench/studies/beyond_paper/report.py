@@ -84,6 +84,11 @@ def effect_table(table: pd.DataFrame) -> pd.DataFrame:
     return wide.loc[rows["variant"].unique(), rows["column"].unique()].reset_index()
 
 
+def effects_markdown(table: pd.DataFrame) -> str:
+    """The duels of the variants as a Markdown table."""
+    return _format_table(effect_table(table))
+
+
 _READING = """\
 Medians of the condition number; an infeasible end counts as infinite, and the share of the feasible ones stands in
 brackets where it is not 100 %. All runs of a line have the same number of evaluations and, repetition by repetition,

@@ -19,7 +19,7 @@ from bench.studies.landscape.choice_studies import (
     tuning_section,
     tuning_sentence,
 )
-from bench.studies.landscape.ratios import Ratio, quartile_ratio_text
+from bench.studies.landscape.ratios import Ratio, mean_ratio, quartile_ratio_text
 from bench.studies.landscape.sources import Comparison, Sources
 from bench.studies.landscape.standing import BETTER, CANNOT_TELL, FEATURES, POWER, standings
 
@@ -47,6 +47,7 @@ def choice_page(sources: Sources) -> str:
         *_short_answer(sources),
         _READING,
         *_plain_section(sources),
+        *_readings_section(sources),
         *_asking_section(sources),
         *budget_section(sources),
         *time_section(sources),
@@ -68,6 +69,7 @@ def _short_answer(sources: Sources) -> Iterator[str]:
         time_sentence(sources),
         tuning_sentence(sources),
         _kind_sentence(sources),
+        _readings_sentence(sources),
     ]
     yield "\n".join(points)
 
@@ -131,6 +133,51 @@ def _plain_section(sources: Sources) -> Iterator[str]:
         f"{sources.suite.repetitions} repetitions."
     )
     yield _field_table(sources, sources.plain, sources.choice)
+
+
+def _reading_ratio(sources: Sources, label: str) -> Ratio:
+    """Of an algorithm under another reading to the choice, on suite 1."""
+    ours, theirs = sources.readings.medians(label), sources.suite.medians(sources.choice)
+    return mean_ratio(ours, theirs, sources.groups)
+
+
+def _readings_sentence(sources: Sources) -> str:
+    """Whether another reading of an algorithm ends below the choice."""
+    ratios = {label: _reading_ratio(sources, label) for label in sources.readings.algorithms}
+    better = [label for label, ratio in ratios.items() if ratio.told_apart and ratio.value < 1]
+    tied = [label for label, ratio in ratios.items() if not ratio.told_apart]
+    return (
+        f"- **All this is of the algorithms as read here.** Of {len(ratios)} other readings of the paper's six on "
+        f"{CHOSEN_ON}, the source's text as printed or its authors' program, these end below {_name(sources.choice)}: "
+        f"{', '.join(map(_reading_name, better)) or 'none'}; not told apart from it: "
+        f"{', '.join(map(_reading_name, tied)) or 'none'}."
+    )
+
+
+def _reading_name(label: str) -> str:
+    name, _, reading = label.partition(" ")
+    return f"{_name(name)} ({reading})"
+
+
+def _readings_section(sources: Sources) -> Iterator[str]:
+    """What other readings of the algorithms change on suite 1."""
+    both = pd.concat([sources.suite.only(sources.plain).table, sources.readings.table])
+    ranks = Comparison(both, sources.suite.settings).average_ranks()
+    yield "## Other readings of the algorithms"
+    yield (
+        "The rows above are of the algorithms as read here. A source's text as printed and its authors' program are "
+        "other readings (`reading`; the docstrings say what each does), from the same first populations. Suite 1: rank "
+        f"among all {len(ranks)}, and the ratio to {_name(sources.choice)}, both as here and as read otherwise."
+    )
+    rows = []
+    for name in dict.fromkeys(label.partition(" ")[0] for label in sources.readings.algorithms):
+        cells = [_name(name), f"{ranks[name]:.1f}", sources.ratio(sources.suite, name, sources.choice).text()]
+        for label in (f"{name} text", f"{name} program"):
+            known = label in ranks
+            cells += [f"{ranks[label]:.1f}", _reading_ratio(sources, label).text()] if known else ["-", "-"]
+        rows.append(cells)
+    headings = ["algorithm", "rank, as here", "ratio", "rank, text", "ratio", "rank, program", "ratio"]
+    yield markdown_table(headings, rows, range(1, 7))
 
 
 def _field_table(sources: Sources, algorithms: Sequence[str], reference: str) -> str:

@@ -84,6 +84,7 @@ class Sources:
 
     suite: Comparison
     held_out: Comparison
+    readings: Comparison
     derivatives: Comparison
     derivative_budgets: Comparison
     budgets: Comparison
@@ -104,6 +105,7 @@ class Sources:
         return Sources(
             suite=Comparison.read(results / "suite", "suite"),
             held_out=Comparison.read(results / "suite", "suite_heldout"),
+            readings=Comparison.read(results / "suite", "suite_readings"),
             derivatives=Comparison.read(results / "derivatives", "derivatives"),
             derivative_budgets=Comparison.read(results / "derivatives", "derivatives_budgets"),
             budgets=Comparison.read(results / "study", "study_budgets"),

@@ -10,7 +10,7 @@ from algorithms.parameter_types import OURS
 from bench.printed import Printed
 from bench.studies.mutations import MutationHistory
 from bench.studies.paper.identification import BestRun, SimulatedIdentification
-from bench.studies.paper.literal import READINGS, Identifiability, Reading, identifiability, literal_matrix
+from bench.studies.paper.literal import LITERAL_READINGS, Identifiability, Reading, identifiability, literal_matrix
 from bench.studies.paper.published import PublishedReading
 from bench.studies.paper.ranking import Standing
 from bench.tables import summary_table, times_table
@@ -54,7 +54,8 @@ def percent_change(new: float, old: float) -> float:
 class Evidence:
     """frames: tidy outcomes by experiment. deviations, differences: from Tables 1 and 2.
 
-    rankings: by reading of the algorithms. default: the label of Table 3's problem among the conventions.
+    rankings: by reading of the algorithms; two_programs: with the authors' programs of `TWO_PROGRAMS` alone.
+    default: the label of Table 3's problem among the conventions.
     mutation_histories: MuPSO's runs of Table 3 by the reading of eq. 6. readings: the paper's dynamics as printed.
     """
 
@@ -63,6 +64,7 @@ class Evidence:
     deviations: list[str]
     differences: list[str]
     rankings: Mapping[str, list[Standing]]
+    two_programs: list[Standing]
     default: str
     mutation_histories: Mapping[str, list[MutationHistory]]
     best: BestRun
@@ -75,9 +77,9 @@ class Evidence:
         """The standings by our readings of the algorithms."""
         return self.rankings[OURS]
 
-    def default_standing(self, reading: str) -> Standing:
-        """The standing of a reading under the default conventions, those of Table 3."""
-        return next(standing for standing in self.rankings[reading] if standing.problem == self.default)
+    def default_standing(self, found: list[Standing]) -> Standing:
+        """The standing under the default conventions, those of Table 3."""
+        return next(standing for standing in found if standing.problem == self.default)
 
     def column(self, experiment: str, statistic: str) -> dict[Any, float]:
         """A statistic of the ends or the seconds of an experiment, by algorithm, or by (swarm size, algorithm)."""
@@ -89,4 +91,4 @@ class Evidence:
 
 def literal_readings(paper: Printed) -> list[tuple[Reading, Identifiability]]:
     """The identifiability of the parameters under each literal reading of the paper's dynamics."""
-    return [(reading, identifiability(literal_matrix(paper, reading))) for reading in READINGS]
+    return [(reading, identifiability(literal_matrix(paper, reading))) for reading in LITERAL_READINGS]

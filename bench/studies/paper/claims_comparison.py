@@ -138,7 +138,7 @@ def _order_claims(evidence: Evidence) -> Iterator[Claim]:
 
 def _default_figures(evidence: Evidence, statistic: str, reading: str) -> dict[str, float]:
     """A statistic under the default conventions by algorithm."""
-    standing = evidence.default_standing(reading)
+    standing = evidence.default_standing(evidence.rankings[reading])
     return {"minimum": standing.minima, "average": standing.averages, "standard_deviation": standing.deviations}[
         statistic
     ]

@@ -44,7 +44,7 @@ class Reading:
         return f"{motion}; P in the {frame} frame; {self.rows}; {gravity} gravity; inertia columns of {self.inertia}"
 
 
-READINGS = (
+LITERAL_READINGS = (
     Reading(False, False, "third moment", True),
     Reading(False, False, "moments", True),
     Reading(False, False, "wrench", True),

@@ -16,16 +16,24 @@ READINGS = {OURS: "as here", "text": "the sources' text as printed", "program": 
 """Readings of the algorithms; one that an algorithm lacks is that of here. No program of MuPSO is published."""
 
 
+TWO_PROGRAMS = ("woa", "goa")
+"""The algorithms whose authors' programs differ most from what their texts say."""
+
+
 def frames_by_reading(frame: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """By reading, the rows of each algorithm under its own name; a label is NAME, or NAME and the reading."""
+    names = dict.fromkeys(str(label).partition(" ")[0] for label in frame["algorithm"])
+    return {reading: frame_read_as(frame, dict.fromkeys(names, reading)) for reading in READINGS}
+
+
+def frame_read_as(frame: pd.DataFrame, readings: Mapping[str, str]) -> pd.DataFrame:
+    """The rows of each algorithm under its own name, of these readings by name; of ours where there is none."""
     labels = dict.fromkeys(map(str, frame["algorithm"]))
-    names = [label for label in labels if label.rpartition(" ")[2] not in READINGS]
-    frames = {}
-    for reading in READINGS:
-        chosen = {f"{name} {reading}" if f"{name} {reading}" in labels else name: name for name in names}
-        rows = frame[frame["algorithm"].isin(list(chosen))]
-        frames[reading] = rows.assign(algorithm=rows["algorithm"].map(chosen)).reset_index(drop=True)
-    return frames
+    names = dict.fromkeys(label.partition(" ")[0] for label in labels)
+    wanted = {name: f"{name} {readings.get(name, OURS)}" for name in names}
+    chosen = {label if label in labels else name: name for name, label in wanted.items()}
+    rows = frame[frame["algorithm"].isin(list(chosen))]
+    return rows.assign(algorithm=rows["algorithm"].map(chosen)).reset_index(drop=True)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,14 @@ from bench.studies.mutations import MutationHistory, replay_mutations
 from bench.studies.paper.claims import Evidence, literal_readings
 from bench.studies.paper.identification import BestRun, find_best_run, simulate_identification
 from bench.studies.paper.published import published_readings
-from bench.studies.paper.ranking import SUBJECT, frames_by_reading, ranking_table, standings
+from bench.studies.paper.ranking import (
+    SUBJECT,
+    TWO_PROGRAMS,
+    frame_read_as,
+    frames_by_reading,
+    ranking_table,
+    standings,
+)
 from bench.studies.paper.settings import (
     Figure4Settings,
     Table1Settings,
@@ -86,15 +93,14 @@ def _gather_evidence(
 ) -> Evidence:
     paper = read_printed()
     frames, best = _read_outcomes(items, loaded, options)
+    known = best_known_values(loaded["ranking"].entries, records)
     return Evidence(
         paper=paper,
         frames=frames,
         deviations=table1_deviations(items.table1.arm, paper),
         differences=table2_differences(loaded[items.table2.experiment].entries, paper),
-        rankings={
-            reading: standings(frame, best_known_values(loaded["ranking"].entries, records))
-            for reading, frame in frames_by_reading(frames["ranking"]).items()
-        },
+        rankings={reading: standings(frame, known) for reading, frame in frames_by_reading(frames["ranking"]).items()},
+        two_programs=standings(frame_read_as(frames["ranking"], dict.fromkeys(TWO_PROGRAMS, "program")), known),
         default=_default_label(loaded),
         mutation_histories=_replay_subject(loaded["table3"], options.workers),
         best=best,

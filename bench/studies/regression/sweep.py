@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any, Literal, NamedTuple, Self
@@ -125,10 +125,14 @@ _BASELINE_REMEDY = "make it anew with `armlab tools regression --update-baseline
 
 @dataclass(frozen=True)
 class Baseline:
-    """ends: (m,) of each cell, from the baseline's own seed. fixed_run: (n,), what the check itself gave then."""
+    """ends: (m,) of each cell, from the baseline's own seed. fixed_run: (n,), what the check itself gave then.
+
+    kernels: of BLAS, and SIMD level, of the cells of algorithms that call LAPACK.
+    """
 
     ends: Ends
     fixed_run: Ends
+    kernels: dict[Cell, str] = field(default_factory=dict)
 
 
 def write_baseline(path: Path, sweep: Sweep, baseline: Baseline, kept: Any = None) -> None:
@@ -155,12 +159,6 @@ def read_baseline(path: Path, sweep: Sweep) -> Baseline:
     if baseline.ends.keys() != set(sweep.cells):
         raise InputError(f"'cells' in {path} are not those of configuration '{sweep.name}': {_BASELINE_REMEDY}")
     return baseline
-
-
-def read_provenance(path: Path) -> dict[str, Any]:
-    """Versions and processor of the machine that made a baseline."""
-    found: dict[str, Any] = _read_content(path).get("provenance") or {}
-    return found
 
 
 def read_part_of_baseline(path: Path, sweep: Sweep) -> tuple[Baseline, Any]:
@@ -192,7 +190,8 @@ def _read_content(path: Path) -> dict[str, Any]:
 
 def _read_cells(content: dict[str, Any], path: Path) -> Baseline:
     try:
-        return Baseline(_read_ends(content, "baseline"), _read_ends(content, "fixed_run"))
+        kernels = {_cell_of(entry): str(entry["kernels"]) for entry in content["cells"] if "kernels" in entry}
+        return Baseline(_read_ends(content, "baseline"), _read_ends(content, "fixed_run"), kernels)
     except (KeyError, TypeError, ValueError):
         raise InputError(f"'cells' in {path} are not as they were written: {_BASELINE_REMEDY}") from None
 
@@ -219,7 +218,8 @@ def _check_configuration(recorded: Any, sweep: Sweep, path: Path) -> None:
 
 
 def _cell_text(cell: Cell, baseline: Baseline) -> str:
-    head = json.dumps(cell._asdict())[1:-1]
+    named = {"kernels": baseline.kernels[cell]} if cell in baseline.kernels else {}
+    head = json.dumps(cell._asdict() | named)[1:-1]
     samples = (("baseline", baseline.ends[cell]), ("fixed_run", baseline.fixed_run[cell]))
     lines = [f'   "{name}": {json.dumps(_to_json_numbers(ends))}' for name, ends in samples]
     return f"  {{{head},\n" + ",\n".join(lines) + "}"
@@ -230,10 +230,12 @@ def _to_json_numbers(ends: Array) -> list[float | None]:
     return [float(end) if np.isfinite(end) else None for end in np.sort(ends)]
 
 
+def _cell_of(entry: dict[str, Any]) -> Cell:
+    return Cell(entry["problem"], entry["algorithm"])
+
+
 def _read_ends(content: dict[str, Any], sample: str) -> Ends:
     return {
-        Cell(entry["problem"], entry["algorithm"]): np.array(
-            [np.inf if end is None else float(end) for end in entry[sample]]
-        )
+        _cell_of(entry): np.array([np.inf if end is None else float(end) for end in entry[sample]])
         for entry in content["cells"]
     }

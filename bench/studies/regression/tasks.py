@@ -4,20 +4,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from algorithms.registry import load
 from bench.files import check_folder
 from bench.fingerprint import calls_lapack
-from bench.processor import processor_kernels
+from bench.plan import Entry
+from bench.processor import kernels_text
 from bench.run import ProgressBar
 from bench.studies.regression.check import judge_run
 from bench.studies.regression.sweep import (
     Baseline,
     Cell,
+    Ends,
     Sweep,
     plan_entries,
     read_baseline,
     read_part_of_baseline,
-    read_provenance,
     read_sweep,
     run_entries,
     write_baseline,
@@ -50,21 +53,18 @@ class RegressionTasks:
         """Run the fixed sweep and compare it with the baseline."""
         sweep = read_sweep(self.config)
         baseline = read_baseline(self.results / BASELINE_FILE, sweep)
-        entries = plan_entries(sweep)
-        with self.bar(len(entries), 0) as progress:
-            verdict = judge_run(baseline, run_entries(entries, self.workers, progress.update), sweep.false_alarm_rate)
-        places = describe_processors(sweep, read_provenance(self.results / BASELINE_FILE))
-        return TaskReport([*verdict.lines(), *places], 0 if verdict.passed else 1)
+        now = self._run(plan_entries(sweep))
+        cells = lapack_cells(sweep)
+        of_other_kernels = {cell for cell in cells if baseline.kernels.get(cell) != kernels_text()}
+        verdict = judge_run(baseline, now, sweep.false_alarm_rate, of_other_kernels)
+        return TaskReport([*verdict.lines(), *describe_kernels(cells, baseline.kernels)], 0 if verdict.passed else 1)
 
     def update_baseline(self) -> TaskReport:
         """Make the baseline anew from the present code, and check that the fixed run passes against it."""
         sweep = read_sweep(self.config)
         check_folder(self.results, "regression_baseline", "")
-        ends, fixed = plan_entries(sweep, sweep.baseline), plan_entries(sweep)
-        with self.bar(len(ends) + len(fixed), 0) as progress:
-            baseline = Baseline(
-                run_entries(ends, self.workers, progress.update), run_entries(fixed, self.workers, progress.update)
-            )
+        ends, fixed = self._run(plan_entries(sweep, sweep.baseline)), self._run(plan_entries(sweep))
+        baseline = Baseline(ends, fixed, dict.fromkeys(lapack_cells(sweep), kernels_text()))
         path = self.results / BASELINE_FILE
         write_baseline(path, sweep, baseline)
         verdict = judge_run(baseline, baseline.fixed_run, sweep.false_alarm_rate)
@@ -73,24 +73,33 @@ class RegressionTasks:
     def extend_baseline(self) -> TaskReport:
         """Add the cells that the baseline lacks, and leave those that it has as they are.
 
-        Whether the present code still gives those is what `check` says afterwards.
+        A cell that calls LAPACK and names no kernels gets those of this process where its fixed run comes out the same,
+        else it is made anew. Whether the present code still gives the others is what `check` says afterwards.
         """
         sweep, path = read_sweep(self.config), self.results / BASELINE_FILE
-        known, kept = read_part_of_baseline(path, sweep)
+        there, kept = read_part_of_baseline(path, sweep)
+        unnamed = set(lapack_cells(sweep)) & there.ends.keys() - there.kernels.keys()
+        again = self._run([entry for entry in plan_entries(sweep) if _cell(entry) in unnamed])
+        found = {cell for cell, ends in again.items() if np.array_equal(np.sort(ends), there.fixed_run[cell])}
+        known = there.ends.keys() - (unnamed - found)
         ends, fixed = (
-            [entry for entry in entries if Cell(entry.problem, entry.algorithm) not in known.ends]
+            self._run([entry for entry in entries if _cell(entry) not in known])
             for entries in (plan_entries(sweep, sweep.baseline), plan_entries(sweep))
         )
-        if not ends:
+        if not ends and not found:
             return TaskReport([f"{path} has every cell of configuration '{sweep.name}'"])
-        with self.bar(len(ends) + len(fixed), 0) as progress:
-            added = Baseline(
-                run_entries(ends, self.workers, progress.update), run_entries(fixed, self.workers, progress.update)
-            )
-        samples = ({**known.ends, **added.ends}, {**known.fixed_run, **added.fixed_run})
-        ordered = [{cell: sample[cell] for cell in sweep.cells if cell in sample} for sample in samples]
-        write_baseline(path, sweep, Baseline(*ordered), kept)
-        return TaskReport([f"wrote {path}: {len(added.ends)} cells are new, {len(known.ends)} as they were"])
+        samples = ({**there.ends, **ends}, {**there.fixed_run, **fixed})
+        all_ends, fixed_run = ({cell: sample[cell] for cell in sweep.cells if cell in sample} for sample in samples)
+        named = dict.fromkeys(found | (set(lapack_cells(sweep)) & ends.keys()), kernels_text())
+        write_baseline(path, sweep, Baseline(all_ends, fixed_run, there.kernels | named), kept)
+        return TaskReport([f"wrote {path}: {len(ends)} cells are new, {len(known)} as they were"])
+
+    def _run(self, entries: Sequence[Entry]) -> Ends:
+        """The ends of trials, run anew; nothing without trials."""
+        if not entries:
+            return {}
+        with self.bar(len(entries), 0) as progress:
+            return run_entries(entries, self.workers, progress.update)
 
     def calibrate(self) -> TaskReport:
         """Compute the check's false-alarm rate and power, and write them down."""
@@ -108,14 +117,24 @@ class RegressionTasks:
         return TaskReport([f"wrote {path}" for path in write_calibration(self.results, sweep, calibration)])
 
 
-def describe_processors(sweep: Sweep, recorded: Mapping[str, str]) -> list[str]:
-    """For which kernels the cells of algorithms that call LAPACK hold, here and in the baseline, in words."""
-    names = [choice.name for choice in sweep.algorithms if calls_lapack(load(choice.name))]
-    if not names:
-        return []
-    here = processor_kernels()
-    there = recorded.get("blas_kernels", "kernels that it does not name")
+def _cell(entry: Entry) -> Cell:
+    return Cell(entry.problem, entry.algorithm)
+
+
+def lapack_cells(sweep: Sweep) -> list[Cell]:
+    """The cells of algorithms that call LAPACK, so that the kernels of BLAS decide their last digits and their path."""
+    callers = {choice.label or choice.name for choice in sweep.algorithms if calls_lapack(load(choice.name))}
+    return [cell for cell in sweep.cells if cell.algorithm in callers]
+
+
+def describe_kernels(cells: Sequence[Cell], recorded: Mapping[Cell, str]) -> list[str]:
+    """For which kernels the cells that call LAPACK hold, here and in the baseline, in words."""
+    here = kernels_text()
+    by_kernels: dict[str, list[str]] = {}
+    for cell in cells:
+        by_kernels.setdefault(recorded.get(cell, "kernels that it does not name"), []).append(str(cell.algorithm))
     return [
-        f"{', '.join(names)} call LAPACK: their cells are of {here['blas_kernels']} ({here['simd']}); the baseline is "
-        f"of {recorded.get('processor')}, {there}. Other kernels give other ends of the same distribution."
+        f"Cells of {', '.join(dict.fromkeys(names))} call LAPACK: here they are of {here}, "
+        + ("as those of the baseline." if there == here else f"those of the baseline of {there}.")
+        for there, names in by_kernels.items()
     ]

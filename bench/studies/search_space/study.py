@@ -128,8 +128,8 @@ where the space begins. Improved: the end of a descent in the space from there; 
 known."""
 
 
-def search_space_page(comparison: pd.DataFrame, figures: Sequence[SpaceFigures], repetitions: int) -> str:
-    """Both tables as a Markdown page."""
+def comparison_markdown(comparison: pd.DataFrame) -> str:
+    """The comparison of both spaces as a Markdown table."""
     headings = ["problem", "algorithm", "coefficients", "feasible space", "A12", "p", "better"]
     rows = [
         (
@@ -143,6 +143,11 @@ def search_space_page(comparison: pd.DataFrame, figures: Sequence[SpaceFigures],
         )
         for row in comparison.to_dict("records")
     ]
+    return markdown_table(headings, rows)
+
+
+def search_space_page(comparison: pd.DataFrame, figures: Sequence[SpaceFigures], repetitions: int) -> str:
+    """Both tables as a Markdown page."""
     lost = [
         (
             each.problem,
@@ -162,7 +167,7 @@ def search_space_page(comparison: pd.DataFrame, figures: Sequence[SpaceFigures],
         "The feasible search space",
         "## Each algorithm in both spaces",
         f"{_READING} {power_text(repetitions, comparisons)}. Settings: `search_space.settings.yaml`.",
-        markdown_table(headings, rows),
+        comparison_markdown(comparison),
         "## What it gives up",
         markdown_table(lost_headings, lost),
         _GIVEN_UP_READING.format(points=RANDOM_POINTS),

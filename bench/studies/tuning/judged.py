@@ -21,6 +21,8 @@ from bench.tables import GROUP_COLUMNS
 TUNED = " tuned"
 """Ends the label of an algorithm with its tuned hyper-parameters."""
 SUBJECT = "mupso"
+ALL_TUNED = "all tuned"
+"""The comparison of MuPSO with every other algorithm, all tuned."""
 ProblemDuels = list[tuple[str, list[Duel]]]
 """Duels by problem."""
 
@@ -95,7 +97,7 @@ class JudgedRuns:
         """All duels with effect sizes and 95 % intervals; `comparison` says over what Holm's correction goes."""
         comparisons = {"tuned against published": self.tuning_duels()}
         if SUBJECT in self.settings.algorithms:
-            comparisons["all tuned"] = self.subject_duels(tuned=True)
+            comparisons[ALL_TUNED] = self.subject_duels(tuned=True)
             comparisons["all as published"] = self.subject_duels(tuned=False)
         comparisons["sweep against published"] = self.sweep_duels(tuned=False)
         comparisons["sweep against tuned"] = self.sweep_duels(tuned=True)
