@@ -8,16 +8,17 @@ import pytest
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.settings import Settings, vary
+from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.design import DesignMatrix
 from armlab.diagnosis.torque.columns.solver import State
-from armlab.diagnosis.torque.diagnose import NamedEffects, _with_probable, prepare
+from armlab.diagnosis.torque.diagnose import prepare
 from armlab.diagnosis.torque.evidence.evidence import Judge
 from armlab.diagnosis.torque.names.additions import (
-    Additions,
     Found,
     _acting_where,
     _added,
     _named,
+    add_probable,
     with_likeliest_names,
 )
 from armlab.diagnosis.torque.names.choice import Weights
@@ -84,8 +85,9 @@ def test_what_passed_takes_its_likeliest_name(model: FittedModel, monkeypatch: p
         "armlab.diagnosis.torque.names.decide.calibrated_weights", lambda left_out: Weights({"is cable_stiffness": 9.0})
     )
     held = holding(model, effect)
-    named, effects = with_likeliest_names(held, Judge(held, held.state).effects(), ())
-    (group,) = effects
+    belief = with_likeliest_names(Belief(held, Judge(held, held.state).effects()))
+    named = belief.model
+    (group,) = belief.effects
     assert named.state.groups == (group,)
     assert named.solver.groups[group].candidate.effect == "cable_stiffness"
     assert len(named.steps) == (effect != "cable_stiffness")
@@ -103,7 +105,8 @@ def test_what_passed_keeps_its_name_where_the_numbers_of_a_likelier_one_cannot_b
     )
     held = holding(model, "gravity_compensator")
     known = Judge(held, held.state).effects()
-    assert with_likeliest_names(held, known, ()) == (held, known)
+    belief = Belief(held, known)
+    assert with_likeliest_names(belief) is belief
 
 
 def test_what_passed_keeps_its_name_where_none_is_likelier(model: FittedModel, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -114,7 +117,8 @@ def test_what_passed_keeps_its_name_where_none_is_likelier(model: FittedModel, m
             "armlab.diagnosis.torque.names.decide.calibrated_weights",
             lambda left_out, weights=weights: Weights(weights),
         )
-        assert with_likeliest_names(held, known, ()) == (held, known)
+        belief = Belief(held, known)
+        assert with_likeliest_names(belief) is belief
 
 
 def test_what_is_added_in_the_place_of_an_effect_leaves_no_trace_of_it(
@@ -127,10 +131,14 @@ def test_what_is_added_in_the_place_of_an_effect_leaves_no_trace_of_it(
     (old,) = held.state.groups
     evidence = Judge(held, held.state).effects()[old]
     found = found_as(model, "cable_stiffness")
-    added = Additions(replace(held, state=found[1]), {found[0]: found[2]}, {})
-    monkeypatch.setattr("armlab.diagnosis.torque.diagnose.add_probable", lambda model, left: added)
-    monkeypatch.setattr("armlab.diagnosis.torque.diagnose.with_likeliest_names", lambda *given: given[:2])
-    named, _ = _with_probable(NamedEffects(held, {old: evidence}, {}, ()))
+    weights = Weights({"is cable_stiffness": 9.0})
+    monkeypatch.setattr("armlab.diagnosis.torque.names.decide.calibrated_weights", lambda left_out: weights)
+    names = weigh_effect(replace(model, state=found[1]), found[0], {found[0]: found[2]}, ())
+    monkeypatch.setattr("armlab.diagnosis.torque.names.additions.doubtful_names", lambda *_, **exact: {})
+    monkeypatch.setattr("armlab.diagnosis.torque.names.additions._named", lambda *_: (found, names))
+    likeliest = iter([found])
+    monkeypatch.setattr("armlab.diagnosis.torque.names.additions._likeliest", lambda *_: next(likeliest, None))
+    named = add_probable(Belief(held, {old: evidence}))
     assert set(named.effects) == {found[0]} == set(named.model.state.groups)
 
 

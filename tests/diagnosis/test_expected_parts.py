@@ -8,6 +8,7 @@ import pytest
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.solver import State
 from armlab.diagnosis.torque.diagnose import prepare
 from armlab.diagnosis.torque.names.expected_parts import claim_expected_parts
@@ -37,8 +38,9 @@ def nothing_named() -> FittedModel:
 def test_friction_that_predictions_need_is_claimed_by_its_likeliest_law_and_no_other(
     nothing_named: FittedModel,
 ) -> None:
-    model, effects = claim_expected_parts(nothing_named, {}, fit_prediction(nothing_named))
-    named = [nothing_named.solver.groups[group].candidate for group in effects]
+    belief = claim_expected_parts(Belief(nothing_named, prediction=fit_prediction(nothing_named)))
+    model, effects = belief.model, belief.effects
+    named = [model.candidate(group) for group in effects]
     assert [(each.effect, each.joint) for each in named] == [("viscous_friction", 2)]
     assert set(effects) <= set(model.state.groups)
     assert "which predicts" in model.steps[-1].what
@@ -52,4 +54,5 @@ def test_a_joint_whose_friction_is_named_gets_no_second_law(nothing_named: Fitte
         if (each.candidate.effect, each.candidate.joint) == ("coulomb_friction", 2)
     )
     named = replace(nothing_named, state=nothing_named.state.plus(own))
-    assert claim_expected_parts(named, {}, fit_prediction(named)) == (named, {})
+    belief = Belief(named, prediction=fit_prediction(named))
+    assert claim_expected_parts(belief) is belief

@@ -41,7 +41,7 @@ def test_each_guard_is_off_once_and_no_stage_before_its_own_is_done_again(monkey
         "fit_background": lambda *_: ("background",),
         "_with_settings": lambda each, settings: (*each, settings),
         "search_effects": lambda each, _: (*each, "search"),
-        "conclude": lambda recording, each, _: each,
+        "conclude_search": lambda recording, each, _: each,
         "diagnose": lambda recording, settings: ("all", settings),
     }
     for name, stage in stages.items():

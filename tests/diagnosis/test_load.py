@@ -11,10 +11,12 @@ from public_copies import needs_copies
 from refusals import refusal
 
 from armlab.common.documents import Document
+from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.carried_load import nominal_payload_lines
 from armlab.diagnosis.torque.columns.design import DesignMatrix
-from armlab.diagnosis.torque.diagnose import NamedEffects, diagnose, find_names
+from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.diagnosis.torque.search.fitted_model import Progress
+from armlab.diagnosis.torque.stages import find_names
 from armlab.identification.payload import PayloadSetting, Place
 from armlab.recordings.load import load_recording
 from armlab.recordings.public import fetch_recording
@@ -25,9 +27,9 @@ TRUTH = {"m": 1.5, "mcx": 0.075, "mcz": 0.12, "Ixx": 0.0136, "Iyy": 0.01735, "Iz
 @pytest.fixture(scope="module", autouse=True)
 def names_found_once() -> Iterator[None]:
     """The names of a recording are found once: each load, and a diagnosis, begins with them."""
-    known: dict[str, NamedEffects] = {}
+    known: dict[str, Belief] = {}
 
-    def find_once(design: DesignMatrix, seed: int, progress: Progress) -> NamedEffects:
+    def find_once(design: DesignMatrix, seed: int, progress: Progress) -> Belief:
         key = hashlib.sha256(pickle.dumps((design, seed))).hexdigest()
         if key not in known:
             known[key] = find_names(design, seed, progress)

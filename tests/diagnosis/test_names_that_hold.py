@@ -45,7 +45,7 @@ def test_a_name_that_does_not_hold_is_withdrawn_once(monkeypatch: pytest.MonkeyP
         assert len(asked) < 10
         return asked[-1]
 
-    monkeypatch.setattr("armlab.diagnosis.torque.diagnose.names_contradicted_by_residual", same_again)
+    monkeypatch.setattr("armlab.diagnosis.torque.evidence.plausibility.names_contradicted_by_residual", same_again)
     diagnose(cases.recording(lambda motion, time: 0.05 * motion.velocity**3, seconds=6.0))
     assert asked[0]
 

@@ -17,10 +17,11 @@ from armlab.common.errors import InputError
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Settings, vary
 from armlab.diagnosis.torque.columns.solver import State
-from armlab.diagnosis.torque.diagnose import find_names, find_setup, prepare
+from armlab.diagnosis.torque.diagnose import find_setup, prepare
 from armlab.diagnosis.torque.evidence.added_body import body_groups, fit_body, payload_groups
 from armlab.diagnosis.torque.names.intervals import extend_with_shapes
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, Progress
+from armlab.diagnosis.torque.stages import find_names
 from armlab.effects.contract import Candidate, Value
 from armlab.effects.links import (
     MAX_CENTRE_M,

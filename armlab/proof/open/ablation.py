@@ -7,7 +7,7 @@ from typing import Any
 
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import GUARDS, Settings, guards_without, vary
-from armlab.diagnosis.torque.diagnose import conclude, diagnose, prepare
+from armlab.diagnosis.torque.diagnose import conclude_search, diagnose, prepare
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_background, search_effects
 from armlab.diagnosis.tuning import parse_change
 from armlab.effects.library import library
@@ -40,19 +40,19 @@ def diagnose_without_each(recording: Recording, changes: Sequence[str] = ()) -> 
         return
     background = fit_background(design, library(), 0, _no_progress)
     searched = search_effects(background, _no_progress)
-    yield ALL_ON, conclude(recording, searched, _no_progress)
+    yield ALL_ON, conclude_search(recording, searched, _no_progress)
     for guard in GUARDS:
         settings = Settings(guards=guards_without((guard,)))
         if guard in GUARDS_AFTER_SEARCH:
-            yield guard, conclude(recording, _with_settings(searched, settings), _no_progress)
+            yield guard, conclude_search(recording, _with_settings(searched, settings), _no_progress)
         elif guard in GUARDS_IN_SEARCH:
             again = search_effects(_with_settings(background, settings), _no_progress)
-            yield guard, conclude(recording, again, _no_progress)
+            yield guard, conclude_search(recording, again, _no_progress)
         else:
             yield guard, diagnose(recording, settings=settings)
     for change, settings in changed.items():
         if change.startswith(tuple(f"{stage}." for stage in STAGES_AFTER_SEARCH)):
-            yield change, conclude(recording, _with_settings(searched, settings), _no_progress)
+            yield change, conclude_search(recording, _with_settings(searched, settings), _no_progress)
         else:
             yield change, diagnose(recording, settings=settings)
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.links import Widths
 from armlab.diagnosis.torque.columns.solver import Solver, State
-from armlab.diagnosis.torque.evidence.evidence import Evidence
 from armlab.diagnosis.torque.predict.prediction import Prediction
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, inertial_parameters
 from armlab.diagnosis.torque.search.search import Step
@@ -208,15 +208,16 @@ def is_possible_body(ten: Array, tolerance: float = EIGENVALUE_SHARE) -> bool:
     return bool(ten[0] > 0 and values[0] >= -tolerance * float(values[-1]))
 
 
-def possible_links(model: FittedModel, links: dict[int, Evidence]) -> tuple[FittedModel, dict[int, Evidence]]:
+def possible_links(belief: Belief) -> Belief:
     """The links (from 0) that are bodies as they were found, what they are off included; the log says of the others."""
-    if not model.design.settings.guards.physics_signs:
-        return model, links
-    found = _split_among_bodies(model)
+    links = belief.links
+    if not links or not belief.model.design.settings.guards.physics_signs:
+        return belief
+    found = _split_among_bodies(belief.model)
     kept = {link: each for link, each in links.items() if is_possible_body(found[link], EIGENVALUE_TOLERANCE)}
     why = "no body has the mass, centre and inertia that these data give it"
     gone = tuple(Step(f"withdrawn: link {link + 1}: {why}", 0.0) for link in links if link not in kept)
-    return replace(model, steps=(*model.steps, *gone)), kept
+    return replace(belief.with_steps(*gone), links=kept)
 
 
 def _split_among_bodies(model: FittedModel) -> Array:

@@ -2,50 +2,49 @@
 
 from dataclasses import replace
 
+from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.solver import State
-from armlab.diagnosis.torque.evidence.pruning import Pruned, withdraw
+from armlab.diagnosis.torque.evidence.pruning import withdraw
 from armlab.diagnosis.torque.evidence.unknown import (
     is_form_error,
     is_structured,
-    predict_residual_structure,
     predicted_share,
     unknown_evidence,
+    with_what_is_left,
 )
-from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_coloured_noise
+from armlab.diagnosis.torque.search.fitted_model import FittedModel
 from armlab.diagnosis.torque.search.search import Search, Step, rival_formulas
-from armlab.diagnosis.torque.search.surrogate import Structure
 
 
-def find_friction_curves(pruned: Pruned) -> Pruned:
+def find_friction_curves(belief: Belief) -> Belief:
     """The same with a curve in the place of a joint's friction where it is clearly better than every formula.
 
     A curve beside the formulas of a search would take their place before their shapes are known. Here a curve that
     fails a test changes nothing.
     """
-    for joint in range(1, pruned[0].columns.joints + 1):
-        model = pruned[0]
-        least = model.solver.fit(model.state).score + model.design.settings.tuning.pruning.least_evidence
+    for joint in range(1, belief.model.columns.joints + 1):
+        model = belief.model
+        least = model.solver.fit(model.state).score + belief.tuning.pruning.least_evidence
         state = _likeliest_curve(model, joint)
         if state is None or model.solver.fit(state).score < least:
             continue
         (group,) = set(state.groups) - set(model.state.groups)
         step = Step(f"friction curve at joint {joint}", model.solver.fit(state).score)
-        tried = withdraw(replace(model, state=state, steps=(*model.steps, step)), frozenset(), "")
-        if group in tried[0].state.groups:
-            pruned = tried
-    return pruned
+        tried = withdraw(belief.with_state(state, step), frozenset(), "")
+        if group in tried.model.state.groups:
+            belief = tried
+    return belief
 
 
-def name_friction_curves(pruned: Pruned, left: tuple[Structure, ...]) -> tuple[Pruned, tuple[Structure, ...]]:
+def name_friction_curves(belief: Belief) -> Belief:
     """The effects and the structure that is left, with friction curves where that is friction.
 
     A curve takes the place of all friction of its joint, and has to explain most of what a surrogate does. What a
     formula leaves is no fault of its form where it is most of all that is left.
     """
-    model, effects, links = pruned
-    tuning = model.design.settings.tuning
-    named = False
-    for each in left:
+    tuning, named = belief.tuning, False
+    for each in belief.left:
+        model, effects = belief.model, belief.effects
         own = (f"velocity_{each.joint + 1}",)
         if each.depends_on != own or not is_structured(each, tuning):
             continue
@@ -62,12 +61,10 @@ def name_friction_curves(pruned: Pruned, left: tuple[Structure, ...]) -> tuple[P
         if explained <= tuning.unknown.min_curve_share * wanted:
             continue
         (group,) = set(state.groups) - set(model.state.groups)
-        effects = {number: kept for number, kept in effects.items() if number in state.groups} | {group: evidence}
+        kept = {number: known for number, known in effects.items() if number in state.groups}
         step = Step(f"what is left at joint {each.joint + 1} is a friction curve", model.solver.fit(state).score)
-        model, named = replace(changed, steps=(*model.steps, step)), True
-    if named:
-        left = predict_residual_structure(model, fit_coloured_noise(model))
-    return (model, effects, links), left
+        belief, named = replace(belief.with_state(state, step), effects=kept | {group: evidence}), True
+    return with_what_is_left(belief) if named else belief
 
 
 def _likeliest_curve(model: FittedModel, joint: int) -> State | None:

@@ -5,15 +5,17 @@ with other numbers stands for structure that the library lacks, unless the evide
 holds zero, several orders of magnitude or a whole circle is no knowledge of a parameter.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from armlab.diagnosis.result import Claim
+from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.evidence.added_body import mass_found_anew
 from armlab.diagnosis.torque.evidence.evidence import Evidence
-from armlab.diagnosis.torque.evidence.pruning import Pruned, look_again, withdraw
+from armlab.diagnosis.torque.evidence.pruning import look_again, withdraw
+from armlab.diagnosis.torque.evidence.unknown import names_contradicted_by_residual, remaining, with_what_is_left
 from armlab.diagnosis.torque.names.intervals import extend_with_shapes
 from armlab.diagnosis.torque.rows.data import Observed
 from armlab.diagnosis.torque.search.fitted_model import FittedModel
@@ -27,7 +29,7 @@ from armlab.effects.parameters import ParameterValue, parameter_values
 ROUNDING = 1e-9  # of a link's torque at the joint that shows it best: a joint with less does not feel it
 
 
-def withdraw_implausible(pruned: Pruned) -> Pruned:
+def withdraw_implausible(belief: Belief) -> Belief:
     """The same without laws of friction whose numbers cannot be believed, the weakest first, special laws before usual
     ones: usual friction takes their place. Then the search looks once more.
 
@@ -35,38 +37,55 @@ def withdraw_implausible(pruned: Pruned) -> Pruned:
     without the guard `physics_signs`.
     """
     withdrawn = frozenset[int]()
-    while doubts := _doubtful_friction(pruned[0], pruned[1]):
-        model, effects, _ = pruned
-        weakest = min(doubts, key=lambda group: (effects[group].usual, effects[group].score))
-        pruned = withdraw(model, frozenset({weakest}), doubts[weakest])
+    while doubts := _doubtful_friction(belief):
+        weakest = min(doubts, key=lambda group: _strength(belief.effects[group]))
+        belief = withdraw(belief, frozenset({weakest}), doubts[weakest])
         withdrawn |= {weakest}
-    again = look_again(pruned, withdrawn) if withdrawn else pruned
-    return pruned if _doubtful_friction(again[0], again[1]) else again
+    again = look_again(belief, withdrawn) if withdrawn else belief
+    return belief if _doubtful_friction(again) else again
 
 
-def _doubtful_friction(model: FittedModel, effects: dict[int, Evidence]) -> dict[int, str]:
-    facts = {group: model.solver.groups[group].candidate.facts for group in effects}
-    doubts = doubtful_names(model, effects)
+def withdraw_contradicted(belief: Belief) -> Belief:
+    """Without names that what is left at their joint contradicts; all are kept without the guard `unknown`."""
+    if not belief.model.design.settings.guards.unknown:
+        return belief
+    belief, withdrawn = with_what_is_left(belief), frozenset[int]()
+    while doubtful := names_contradicted_by_residual(belief.effects, belief.left, belief.tuning) - withdrawn:
+        withdrawn |= doubtful
+        why = "what is left at its joint is no less structured"
+        belief = with_what_is_left(withdraw_implausible(withdraw(belief, doubtful, why, withdrawn)))
+    wrong = names_contradicted_by_residual(belief.links, belief.left, belief.tuning)
+    return replace(belief, links={link: each for link, each in belief.links.items() if link not in wrong})
+
+
+def _strength(evidence: Evidence) -> tuple[bool, float]:
+    """Special laws before usual ones, and of these the one with less evidence."""
+    return evidence.usual, evidence.score
+
+
+def _doubtful_friction(belief: Belief) -> dict[int, str]:
+    facts = {group: belief.model.candidate(group).facts for group in belief.effects}
+    doubts = doubtful_names(belief.model, belief.effects)
     return {group: why for group, why in doubts.items() if facts[group].contains or facts[group].usual}
 
 
-def unclaim_implausible(
-    model: FittedModel, effects: dict[int, Evidence], left: Sequence[Structure]
-) -> tuple[FittedModel, dict[int, Evidence]]:
+def unclaim_implausible(belief: Belief) -> Belief:
     """The effects whose numbers can be believed; the log says why not. The others stay as present, not claimed.
 
-    left: what is structured beyond chance. A shift in time below one sampling interval is told by a model alone that
-    leaves none: beside what is unknown it is how the log was made.
+    A shift in time below one sampling interval is told by a model alone that leaves nothing structured: beside what is
+    unknown it is how the log was made.
     """
-    doubts = doubtful_names(model, effects, exact=not left)
-    steps = list(model.steps)
+    doubts = doubtful_names(belief.model, belief.effects, exact=not remaining(belief))
+    steps = []
     for group, why in doubts.items():
-        candidate = model.solver.groups[group].candidate
+        candidate = belief.model.candidate(group)
         steps.append(Step(f"present, not claimed: {candidate.effect} {candidate.joint}: {why}", 0.0))
-    return replace(model, steps=tuple(steps)), {group: each for group, each in effects.items() if group not in doubts}
+    kept = {group: each for group, each in belief.effects.items() if group not in doubts}
+    present = {group: belief.effects[group] for group in doubts}
+    return replace(belief.with_steps(*steps), effects=kept, present=present)
 
 
-def doubtful_names(model: FittedModel, effects: dict[int, Evidence], *, exact: bool = False) -> dict[int, str]:
+def doubtful_names(model: FittedModel, effects: Mapping[int, Evidence], *, exact: bool = False) -> dict[int, str]:
     """Why the numbers of a name cannot be believed, for each group of which that is so; exact: of a model that is."""
     if not effects or not model.design.settings.guards.physics_signs:
         return {}

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.solver import State
 from armlab.diagnosis.torque.evidence.added_body import (
     find_body_anew,
@@ -17,9 +18,6 @@ from armlab.diagnosis.torque.evidence.evidence import Evidence, Judge
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, follow_model, scan_residual, with_design
 from armlab.diagnosis.torque.search.refine import refine_shapes
 from armlab.diagnosis.torque.search.search import Search, Step
-
-Pruned = tuple[FittedModel, dict[int, Evidence], dict[int, Evidence]]
-_Passed = tuple[FittedModel, dict[int, Evidence], frozenset[int]]
 
 
 def reason_to_reject(evidence: Evidence, settings: Settings) -> str | None:
@@ -44,97 +42,109 @@ def reason_to_reject(evidence: Evidence, settings: Settings) -> str | None:
     return None
 
 
-def prune(model: FittedModel) -> Pruned:
-    """The round with the effects that pass, and the evidence of those and of the links that do (from 0).
+def prune(belief: Belief) -> Belief:
+    """The effects and links that pass, with their evidence.
 
     After a withdrawal nothing is searched until all that is left passes: what stands in for a withdrawn effect would
     be its copy. Then the search looks once more, without the places that were withdrawn. A body that can exist is held
     from the start, and found anew after withdrawals: they change what is left to it.
     """
-    held = hold_body(model)
-    return _settle_links(_prune_and_search(held, other_bodies(held)))
+    held = hold_body(belief.model)
+    return _settle_links(_prune_and_search(replace(belief, model=held, banned=other_bodies(held))))
 
 
-def _prune_and_search(model: FittedModel, banned: frozenset[int], fixed: bool = False) -> _Passed:
+def _prune_and_search(belief: Belief, fixed: bool = False) -> Belief:
     """What passes of a model, and of what the search finds once more, where that predicts as well in the end.
 
     What is found may be a copy of what passed, so that neither is needed beside the other and both are lost.
     fixed: whether the links' widths stay. They stay beside a body that is held, too: links that are off would take what
     its form, which was found before, does not explain.
     """
-    passed = _remove_failing(model, banned)
-    for _ in range(model.design.settings.tuning.pruning.max_cycles):
-        searched = _search_again(passed[0], passed[2], fixed)
-        if searched.state == passed[0].state:
+    passed = _remove_failing(belief)
+    for _ in range(belief.tuning.pruning.max_cycles):
+        searched = _search_again(passed, fixed)
+        if searched.model.state == passed.model.state:
             break
-        again = _remove_failing(searched, passed[2])
-        if not _lasts(passed[0], again[0]):
-            step = Step("back to what passed before: what was found beside it does not last", passed[0].fit.score)
-            return replace(passed[0], steps=(*again[0].steps, step)), passed[1], again[2]
+        again = _remove_failing(searched)
+        if not _lasts(passed.model, again.model):
+            return replace(_back_to(passed, again, "what was found beside it"), banned=again.banned)
         passed = again
     return passed
 
 
-def _search_again(model: FittedModel, banned: frozenset[int], fixed: bool) -> FittedModel:
+def _back_to(passed: Belief, tried: Belief, what: str) -> Belief:
+    """What passed before, with the log of what was tried."""
+    step = Step(f"back to what passed before: {what} does not last", passed.model.fit.score)
+    return replace(passed, model=replace(passed.model, steps=(*tried.model.steps, step)))
+
+
+def _search_again(belief: Belief, fixed: bool) -> Belief:
     """What a search finds beside effects that passed."""
+    model = belief.model
     steps, widths = list(model.steps), model.state.widths
     known = fixed or widths is None or holds_body(model)
-    search = Search(model.solver, model.design.settings, known, len(widths or ()), banned)
+    search = Search(model.solver, model.design.settings, known, len(widths or ()), belief.banned)
     state = search.climb(model.state, steps)
-    return replace(model, state=state, steps=tuple(steps))
+    return replace(belief, model=replace(model, state=state, steps=tuple(steps)))
 
 
-def withdraw(model: FittedModel, groups: frozenset[int], why: str, before: frozenset[int] = frozenset()) -> Pruned:
+def withdraw(belief: Belief, groups: frozenset[int], why: str, before: frozenset[int] = frozenset()) -> Belief:
     """The same without some groups, and without what no longer passes; usual friction in the place of special laws.
 
     before: groups that were withdrawn earlier; nor do they come back.
     """
-    judge, steps = Judge(model, model.state), list(model.steps)
+    model = belief.model
+    judge, steps = Judge(model, model.state), list[Step]()
     for group in groups:
-        candidate = model.solver.groups[group].candidate
+        candidate = model.candidate(group)
         steps.append(Step(f"withdrawn: {candidate.effect} {candidate.joint}: {why}", 0.0))
     back = {other for group in groups for other in judge.in_place_of(group)}
     state = State(tuple(sorted(set(model.state.groups) - groups | back)), model.state.widths)
-    less = replace(model, state=state, steps=tuple(steps))
-    return _settle_links(_remove_failing(less, groups | before | other_bodies(model)))
+    less = belief.with_state(state, *steps)
+    return _settle_links(_remove_failing(replace(less, banned=groups | before | other_bodies(model))))
 
 
-def look_again(pruned: Pruned, withdrawn: frozenset[int]) -> Pruned:
+def look_again(belief: Belief, withdrawn: frozenset[int]) -> Belief:
     """The same with what a search finds beside it, where all of that passes and is more likely in the end.
 
     withdrawn: groups of whose places nothing is looked for.
     """
-    model, groups = pruned[0], pruned[0].solver.groups
+    model, groups = belief.model, belief.model.solver.groups
     places = {groups[group].place for group in withdrawn}
     banned = other_bodies(model) | {number for number, each in enumerate(groups) if each.place in places}
-    searched = _search_again(model, banned, fixed=False)
-    if searched.state == model.state:
-        return pruned
-    again = _settle_links(_remove_failing(searched, banned))
-    return again if again[0].fit.score > model.fit.score and _lasts(model, again[0]) else pruned
+    searched = _search_again(replace(belief, banned=banned), fixed=False)
+    if searched.model.state == model.state:
+        return belief
+    again = _settle_links(_remove_failing(searched))
+    return again if _is_likelier(model, again.model) else belief
 
 
-def scan_what_is_left(pruned: Pruned) -> Pruned:
+def scan_what_is_left(belief: Belief) -> Belief:
     """The same with what scans find in what it leaves, where that passes, too, and is more likely in the end.
 
     The first scans looked at what links and plain friction leave: what had no name then can hide a gap or a push. Nor
     were they, or the last round, made with the links that passed: a gap is crossed where the load of these is zero.
     """
-    before = pruned[0]
+    before = belief.model
     moved = with_design(before, follow_model(before.design, before))
     design, known = scan_residual(moved), frozenset(range(len(before.design.blocks)))
     if design is moved.design:
-        return pruned
+        return belief
     model = with_design(moved, design)
-    found = _search_again(model, known, fixed=True)
+    searched = _search_again(replace(belief, model=model, banned=known), fixed=True)
+    found = searched.model
     if known.issuperset(found.state.groups):
-        return pruned
+        return belief
     better = refine_shapes(design, found.noise, found.solver, found.state, but=known)
-    again = _settle_links(_remove_failing(with_design(found, design.with_blocks(better)) if better else found, known))
-    if again[0].fit.score > model.fit.score and _lasts(model, again[0]):
-        return again
-    step = Step("back to what passed before: what scans found beside it does not last", before.fit.score)
-    return replace(before, steps=(*again[0].steps, step)), pruned[1], pruned[2]
+    if better:
+        searched = replace(searched, model=with_design(found, design.with_blocks(better)))
+    again = _settle_links(_remove_failing(searched))
+    return again if _is_likelier(model, again.model) else _back_to(belief, again, "what scans found beside it")
+
+
+def _is_likelier(before: FittedModel, after: FittedModel) -> bool:
+    """Whether what a search has changed has more evidence, and predicts held-out rows as well."""
+    return after.fit.score > before.fit.score and _lasts(before, after)
 
 
 def _lasts(before: FittedModel, after: FittedModel) -> bool:
@@ -144,30 +154,31 @@ def _lasts(before: FittedModel, after: FittedModel) -> bool:
     return predicts_as_well(errors[1], errors[0], tolerance)
 
 
-def prefer_one_body(pruned: Pruned) -> Pruned:
+def prefer_one_body(belief: Belief) -> Belief:
     """One body that can exist in the place of bodies and links of what passed, see `hold_body`, where that passes.
 
     Bodies that cannot exist are withdrawn: these data do not tell.
     """
-    held = hold_body(pruned[0])
-    if held is not pruned[0]:
-        tested = withdraw(held, frozenset(), "")
-        pruned = tested if payload_groups(tested[0]) else pruned
-    impossible = frozenset(impossible_bodies(pruned[0]))
-    return withdraw(pruned[0], impossible, "no body has such a mass, centre and inertia") if impossible else pruned
+    held = hold_body(belief.model)
+    if held is not belief.model:
+        tested = withdraw(replace(belief, model=held), frozenset(), "")
+        belief = tested if payload_groups(tested.model) else belief
+    impossible = frozenset(impossible_bodies(belief.model))
+    return withdraw(belief, impossible, "no body has such a mass, centre and inertia") if impossible else belief
 
 
-def _settle_links(passed: _Passed) -> Pruned:
+def _settle_links(belief: Belief) -> Belief:
     """With the links that pass; where they do not, all is tested and searched again with links as simulated."""
-    model, effects, banned = passed
-    model, links = _test_links(model)
+    model, links = _test_links(belief.model)
+    settled = replace(belief, model=model)
     if links is None:
-        model, effects, _ = _prune_and_search(model, banned, fixed=True)
-    return model, effects, links or {}
+        settled = _prune_and_search(settled, fixed=True)
+    return replace(settled, links=links or {})
 
 
-def _remove_failing(model: FittedModel, banned: frozenset[int]) -> _Passed:
+def _remove_failing(belief: Belief) -> Belief:
     """The model without its failing effects, the weakest first; usual friction in the place of special laws."""
+    model, banned = belief.model, belief.banned
     settings, found_anew = model.design.settings, 0
     while True:
         groups, state = model.solver.groups, model.state
@@ -177,7 +188,7 @@ def _remove_failing(model: FittedModel, banned: frozenset[int]) -> _Passed:
         if not bad:
             held = find_body_anew(model)
             if held is model or found_anew >= settings.tuning.pruning.max_cycles:
-                return model, effects, banned
+                return replace(belief, model=model, effects=effects, banned=banned)
             model, found_anew = held, found_anew + 1
             continue
         weakest = min(bad, key=lambda group: (not judge.simpler(group), effects[group].score))

@@ -7,13 +7,20 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.result import Claim, Weighed
+from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.blocks import rows_of_fit
 from armlab.diagnosis.torque.columns.solver import State
 from armlab.diagnosis.torque.evidence.evidence import Evidence
 from armlab.diagnosis.torque.rows.data import rows_in
 from armlab.diagnosis.torque.rows.features import Features, Load, load_banks
 from armlab.diagnosis.torque.rows.noise import Noise
-from armlab.diagnosis.torque.search.fitted_model import FittedModel, inertial_parameters, initial_link_widths, torque_of
+from armlab.diagnosis.torque.search.fitted_model import (
+    FittedModel,
+    fit_coloured_noise,
+    inertial_parameters,
+    initial_link_widths,
+    torque_of,
+)
 from armlab.diagnosis.torque.search.surrogate import Remainder, Structure, Surrogate, fit_surrogate, surest
 from armlab.diagnosis.tuning import Tuning, UnknownTuning
 from armlab.effects.contract import UNKNOWN
@@ -122,6 +129,16 @@ def flexible_gain(model: FittedModel, state: State, joint: int) -> float:
 def is_structured(each: Structure, tuning: Tuning) -> bool:
     """Whether it is more than chance, and large enough to matter."""
     return each.gain > tuning.surrogate.min_structure_gain and each.p_value < tuning.unknown.level
+
+
+def remaining(belief: Belief) -> tuple[Structure, ...]:
+    """The structure that is left and is more than chance."""
+    return tuple(each for each in belief.left if is_structured(each, belief.tuning))
+
+
+def with_what_is_left(belief: Belief) -> Belief:
+    """The same with the structure that surrogates find in what its model leaves."""
+    return replace(belief, left=predict_residual_structure(belief.model, fit_coloured_noise(belief.model)))
 
 
 def unknown_evidence(model: FittedModel, each: Structure, before: Array, after: Array) -> Evidence:

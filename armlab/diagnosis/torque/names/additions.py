@@ -5,16 +5,17 @@ for one law alone. An effect that fails one of them may still be far likelier th
 weighs all of that together, as it was found to be worth on recordings whose truth is known.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from armlab.diagnosis.result import Claim, Member, Weighed
+from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.solver import State
 from armlab.diagnosis.torque.evidence.evidence import Evidence, Judge
 from armlab.diagnosis.torque.evidence.plausibility import doubtful_names
-from armlab.diagnosis.torque.evidence.unknown import is_structured, unknown_claim
+from armlab.diagnosis.torque.evidence.unknown import remaining, unknown_claim, with_what_is_left
 from armlab.diagnosis.torque.names.decide import MOTION_AXES, naming_of
 from armlab.diagnosis.torque.names.weighing import weigh_addition, weigh_effect
 from armlab.diagnosis.torque.search.fitted_model import FittedModel
@@ -25,37 +26,22 @@ from armlab.effects.contract import UNKNOWN, Candidate
 Found = tuple[int, State, Evidence]  # a group beside a model, the state with it, and what speaks for it
 
 
-@dataclass(frozen=True, eq=False)
-class Additions:
-    """A model with what was added, the evidence for it and its names by group.
-
-    unnamed: what is there for certain without a probable name. nothing: names of what may be nothing.
-    """
-
-    model: FittedModel
-    effects: dict[int, Evidence]
-    names: dict[int, Weighed]
-    unnamed: tuple[Claim, ...] = ()
-    nothing: tuple[Weighed, ...] = ()
-
-
-def add_probable(model: FittedModel, left: Sequence[Structure]) -> Additions:
+def add_probable(belief: Belief) -> Belief:
     """Adds the likeliest effects one after the other, where they have a name or a class of names.
 
     What has as much evidence as a name needs, and validation runs do not refute, is there for certain: of its class
     `unknown` may be a part, and it is a finding without a name where none is likely and held-out errors fall enough.
-    Else names alone have to reach the level. Laws whose numbers cannot be believed are neither. left: structure of the
-    joints of the model.
+    Else names alone have to reach the level. Laws whose numbers cannot be believed are neither.
     """
-    exact = not any(is_structured(each, model.design.settings.tuning) for each in left)
-    tuning, banned, out = model.design.settings.tuning, frozenset[int](), Additions(model, {}, {})
+    exact, tuning, left = not remaining(belief), belief.tuning, belief.left
+    banned, out, added = frozenset[int](), belief, set[int]()
     for _ in range(tuning.naming.max_additions):
         first = _likeliest(out.model, banned)
         if first is None:
             break
         found, names = _named(out.model, first, left)
         group, state, evidence = found
-        naming = naming_of(names, model.design.settings)
+        naming = naming_of(names, belief.model.design.settings)
         believed = not doubtful_names(replace(out.model, state=state), {group: evidence}, exact=exact)
         certain = (
             evidence.score >= tuning.pruning.least_evidence
@@ -66,15 +52,18 @@ def add_probable(model: FittedModel, left: Sequence[Structure]) -> Additions:
         likeliest = naming.answers[0].is_of(what.effect, what.joint)
         if believed and naming.may_be(what.effect, what.joint) and (naming.sure or (certain and likeliest)):
             step = Step(f"+ {what.effect} {what.joint}, which is probable", out.model.solver.fit(state).score)
-            added = replace(out.model, state=state, steps=(*out.model.steps, step))
             effects = {each: known for each, known in out.effects.items() if each in state.groups}
-            out = replace(out, model=added, effects=effects | {group: evidence}, names=out.names | {group: names})
+            weighed = {**out.weighed, group: names}
+            out = replace(out.with_state(state, step), effects=effects | {group: evidence}, weighed=weighed)
+            added |= {group}
             continue
         banned |= _acting_where(out.model, first) | _acting_where(out.model, found)
         if believed and certain and evidence.fall >= tuning.naming.least_unnamed_fall:
             out = replace(out, unnamed=(*out.unnamed, _unnamed(out.model, group, state, evidence, names)))
         else:
             out = replace(out, nothing=(*out.nothing, names))
+    if added & set(out.effects) and belief.model.design.settings.guards.unknown:
+        return with_what_is_left(out)
     return out
 
 
@@ -111,20 +100,19 @@ def _likeliest(model: FittedModel, banned: frozenset[int]) -> Found | None:
     return None
 
 
-def with_likeliest_names(
-    model: FittedModel, effects: Mapping[int, Evidence], left: Sequence[Structure]
-) -> tuple[FittedModel, dict[int, Evidence]]:
+def with_likeliest_names(belief: Belief) -> Belief:
     """Effects that passed, each with the likeliest name of its finding where that has a name or a class of names.
 
     A search takes what raises the score most, and what fits best need not be likeliest. A name whose numbers cannot be
-    believed takes no place. left: structure of the joints.
+    believed takes no place.
     """
-    exact = not any(is_structured(each, model.design.settings.tuning) for each in left)
-    out = dict(effects)
-    for group in effects:
+    exact = not remaining(belief)
+    for group in belief.effects:
+        model, out = belief.model, belief.effects
         if group not in out:
             continue
-        naming, own = naming_of(weigh_effect(model, group, out, left), model.design.settings), _candidate(model, group)
+        weighed, own = weigh_effect(model, group, out, belief.left), _candidate(model, group)
+        naming = naming_of(weighed, model.design.settings)
         first = naming.answers[0]
         if naming.is_unknown or first.effect == UNKNOWN.id or first.is_of(own.effect, own.joint):
             continue
@@ -137,9 +125,9 @@ def with_likeliest_names(
             what = _candidate(model, other)
             text = f"{own.effect} {own.joint} -> {what.effect} {what.joint}, which is likelier"
             step = Step(text, model.solver.fit(state).score)
-            model = replace(model, state=state, steps=(*model.steps, step))
-            out = {each: known for each, known in out.items() if each in state.groups} | {other: evidence}
-    return model, out
+            kept = {each: known for each, known in out.items() if each in state.groups}
+            belief = replace(belief.with_state(state, step), effects=kept | {other: evidence})
+    return belief
 
 
 def _named(model: FittedModel, found: Found, left: Sequence[Structure]) -> tuple[Found, Weighed]:

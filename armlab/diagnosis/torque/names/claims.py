@@ -26,7 +26,11 @@ class Names:
 
 
 def make_claims(
-    model: FittedModel, effects: dict[int, Evidence], links: dict[int, Evidence], prediction: Prediction, names: Names
+    model: FittedModel,
+    effects: Mapping[int, Evidence],
+    links: Mapping[int, Evidence],
+    prediction: Prediction,
+    names: Names,
 ) -> tuple[Claim, ...]:
     """All claims of a model, the strongest first, without probabilities.
 
@@ -103,7 +107,7 @@ def _parameters_of_simulation(candidate: Candidate, present: Array) -> dict[str,
 
 
 def _link_claims(
-    model: FittedModel, wide: ShapedFit, links: dict[int, Evidence], names: Mapping[int, Weighed]
+    model: FittedModel, wide: ShapedFit, links: Mapping[int, Evidence], names: Mapping[int, Weighed]
 ) -> list[Claim]:
     """One claim for each link that is off: its ten parameters, given what the joints feel of all links."""
     bench, widths = model.design, model.fit.state.widths

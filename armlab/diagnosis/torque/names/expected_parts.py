@@ -8,6 +8,7 @@ present without a claim no longer disturbs it.
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.solver import State
 from armlab.diagnosis.torque.evidence.evidence import Evidence, Judge
 from armlab.diagnosis.torque.evidence.pruning import reason_to_reject
@@ -17,24 +18,23 @@ from armlab.diagnosis.torque.search.fitted_model import FittedModel
 from armlab.diagnosis.torque.search.search import Search, Step
 
 
-def claim_expected_parts(
-    model: FittedModel, effects: dict[int, Evidence], prediction: Prediction
-) -> tuple[FittedModel, dict[int, Evidence]]:
+def claim_expected_parts(belief: Belief) -> Belief:
     """The same with usual friction and offsets of joints that have none, where leaving them out costs much held out.
 
-    model, effects: with the names of the search. All friction of a joint is tested at once, without a correction for
+    All friction of a joint is tested at once, without a correction for
     what else was looked at; it is missed by more than a minor change instead.
     """
-    found = dict(_that_matter(model, prediction))
+    assert belief.prediction is not None
+    model = belief.model
+    found = dict(_that_matter(model, belief.prediction))
     if not found:
-        return model, effects
-    groups = model.solver.groups
+        return belief
+    candidates = {group: model.candidate(group) for group in found}
     steps = [
-        Step(f"+ {groups[group].candidate.effect} {groups[group].candidate.joint}, which predicts", evidence.score)
-        for group, evidence in found.items()
+        Step(f"+ {each.effect} {each.joint}, which predicts", found[group].score) for group, each in candidates.items()
     ]
     state = State(tuple(sorted({*model.state.groups, *found})), model.state.widths)
-    return replace(model, state=state, steps=(*model.steps, *steps)), effects | found
+    return replace(belief.with_state(state, *steps), effects={**belief.effects, **found})
 
 
 def _that_matter(model: FittedModel, prediction: Prediction) -> Iterator[tuple[int, Evidence]]:

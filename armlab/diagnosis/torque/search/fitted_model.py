@@ -17,7 +17,7 @@ from armlab.diagnosis.torque.rows.noise import Noise, choose_noise, error_colour
 from armlab.diagnosis.torque.search.refine import prior_precision, refine_shapes
 from armlab.diagnosis.torque.search.search import Search, Step, background_state
 from armlab.diagnosis.torque.search.surrogate import fold_features, predict_structure
-from armlab.effects.contract import Family, Scene
+from armlab.effects.contract import Candidate, Family, Scene
 from armlab.effects.model import FittedEffect, torque_in_mechanism
 from problem.regressor import rigid_body_torque
 
@@ -44,6 +44,10 @@ class FittedModel:
     def fit(self) -> Fit:
         """The fit of the state."""
         return self.solver.fit(self.state)
+
+    def candidate(self, group: int) -> Candidate:
+        """The effect of a group of columns, at its place."""
+        return self.solver.groups[group].candidate
 
     def coefficients(self, fit: Fit) -> Array:
         """Of the unscaled columns, (size,)."""

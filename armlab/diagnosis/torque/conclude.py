@@ -1,0 +1,216 @@
+"""From what is believed in the end to a diagnosis: claims, the model that is delivered, and what each part explains."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, replace
+
+import numpy as np
+
+from armlab.common.errors import DataError
+from armlab.diagnosis.formats import Status
+from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Unexplained
+from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.torque.belief import Belief
+from armlab.diagnosis.torque.columns.solver import State
+from armlab.diagnosis.torque.evidence.evidence import Judge, count_looks
+from armlab.diagnosis.torque.evidence.location import locate_excess, noise_floor
+from armlab.diagnosis.torque.evidence.plausibility import (
+    links_that_data_tell,
+)
+from armlab.diagnosis.torque.evidence.unknown import (
+    is_form_error,
+    make_unknown_claim,
+    remaining,
+)
+from armlab.diagnosis.torque.names.claims import Names, links_claim, make_claims
+from armlab.diagnosis.torque.names.decide import named_claims
+from armlab.diagnosis.torque.names.findings import stated_findings, with_minor_ones, without_lesser_unknowns
+from armlab.diagnosis.torque.names.weighing import weigh_effect, weigh_link, weigh_structure
+from armlab.diagnosis.torque.predict.fits import joint_fits
+from armlab.diagnosis.torque.predict.found_model import build_model
+from armlab.diagnosis.torque.predict.joint_friction import joint_friction
+from armlab.diagnosis.torque.predict.parts import LINKS, as_found, claim_facts, explain_error, weigh_claims, weigh_parts
+from armlab.diagnosis.torque.predict.prediction import (
+    Prediction,
+    choose_smoothing,
+    filtered_residual,
+    identification_runs,
+    with_smoothing_of,
+    with_usual,
+)
+from armlab.diagnosis.torque.predict.yardstick import (
+    Yardstick,
+    fit_yardstick,
+    predicts_better,
+    squared_errors,
+    with_claims,
+)
+from armlab.diagnosis.torque.rows.data import Observed
+from armlab.diagnosis.torque.search.fitted_model import (
+    FittedModel,
+    inertial_parameters,
+)
+from armlab.diagnosis.torque.search.surrogate import Structure
+from armlab.diagnosis.tuning import ClaimTuning, changed_numbers
+from armlab.identification.torque_model import TorqueModel
+from armlab.recordings.recording import Recording
+
+
+def conclude(recording: Recording, belief: Belief) -> Diagnosis:
+    """The diagnosis of a recording from what is believed in the end."""
+    prediction, remains = belief.prediction, remaining(belief)
+    assert prediction is not None
+    explained = {**belief.effects, **belief.present}
+    unknowns = [each for each in remains if not is_form_error(each, explained, belief.tuning.unknown)]
+    model, claims = _claims_of(belief, remains, unknowns)
+    weighed = (*(claim.weighed for claim in claims), *belief.nothing)
+    claims = named_claims(claims, model.design.settings, model.design.simulation.joints_without_friction)
+    claims = (*claims, *links_in_doubt(model, prediction.model, claims))
+    claims = stated_findings(weigh_claims(prediction.model, claims), model.columns.joints)
+    return replace(_assemble(recording, model, prediction, claims, unknowns, remains), weighed=weighed)
+
+
+def _claims_of(
+    belief: Belief, remains: Sequence[Structure], unknowns: Sequence[Structure]
+) -> tuple[FittedModel, tuple[Claim, ...]]:
+    """The model with the reasons against claims in its log, and all claims, before a name is chosen for each."""
+    model, effects, links = belief.model, belief.effects, belief.links
+    assert belief.prediction is not None
+    names = Names(
+        {group: belief.weighed.get(group) or weigh_effect(model, group, effects, belief.left) for group in effects},
+        {link: weigh_link(model, link, each, effects, belief.left) for link, each in links.items()},
+    )
+    claims = make_claims(model, effects, links, belief.prediction, names)
+    told, claims = links_that_data_tell(model, claims, remains)
+    residual = model.residual(model.fit)
+    structures = (make_unknown_claim(told, each, residual, weigh_structure(told, each, effects)) for each in unknowns)
+    unnamed = (_without_prediction_of(each, unknowns) for each in belief.unnamed)
+    return told, (*claims, *structures, *unnamed)
+
+
+def links_in_doubt(names: FittedModel, model: FittedModel, claims: Sequence[Claim]) -> Iterator[Claim]:
+    """That links are off, where no claim says so and the model that predicts holds links that are.
+
+    names: the model of the claims, model: the one that predicts. Links that were given to be fitted are no finding.
+    """
+    widths = model.state.widths
+    about_links = any(claim_facts(each).where == "link" for each in claims)
+    if model.design.simulation.kind == "nominal" and widths is not None and any(widths) and not about_links:
+        evidence = Judge(model, model.state).together()
+        off = [links_claim(names, evidence, link) for link, width in enumerate(widths, 1) if width]
+        together = next(part for part in weigh_parts(model, off[:1]) if part.cause == LINKS and part.joint is None)
+        if together.removal is not None and not together.removal.is_minor:
+            yield max(weigh_claims(model, off), key=lambda each: each.removal.growth if each.removal else 0.0)
+
+
+def _without_prediction_of(claim: Claim, unknowns: Sequence[Structure]) -> Claim:
+    """An unnamed claim beside structure that is a finding, too: at one joint, the structure holds what it predicts."""
+    same = any(each.joint + 1 == claim.joint for each in unknowns)
+    return replace(claim, prediction=np.zeros_like(claim.prediction), left_out=0.0) if same else claim
+
+
+def _assemble(
+    recording: Recording,
+    model: FittedModel,
+    prediction: Prediction,
+    claims: tuple[Claim, ...],
+    unknowns: Sequence[Structure],
+    remains: Sequence[Structure],
+) -> Diagnosis:
+    """The diagnosis of a model. unknowns: structure that is a finding `unknown`; remains: all structure."""
+    design, observed, tuning = model.design, model.design.observed, model.design.settings.tuning
+    simulation, settings = design.simulation, _settings_used(design.settings)
+    named = {each.group: each for each in claims if each.group is not None}
+    notes = {
+        "settings": settings,
+        "white_errors_at_joints": [joint for joint, taps in enumerate(model.noise.taps, 1) if len(taps) == 1],
+        "unknown": [each.equation for each in claims if each.candidate is None],
+        "in_links": [f"{each.effect}: {each.equation}" for each in claims if each.in_links],
+    }
+    plain = fit_yardstick(simulation.arm, observed)
+    is_plain_best = plain is not None and simulation.kind != "simulated" and _is_beaten_by(plain, prediction)
+    found = choose_smoothing(
+        build_model(recording, simulation, prediction.model, named, notes), observed, tuning.prediction
+    )
+    if is_plain_best:
+        assert plain is not None
+        found = _delivered(plain, found, observed, claims)
+    alone = build_model(recording, simulation, prediction.with_names_alone(named), named, {})
+    alone = with_smoothing_of(found, alone)
+    final = filtered_residual(found, observed, simulation)
+    refit = model.residual(model.solver.fit(State((), None)))
+    start = refit if simulation.kind == "refit" else design.target
+    noise = final.copy()
+    for each in unknowns:
+        noise[:, each.joint] -= each.prediction
+    floor = noise_floor(noise, design.features, observed, tuning.surrogate)
+    fits = joint_fits(refit, (found, alone), plain, floor, observed, simulation, tuning)
+    parts = explain_error(prediction.model, observed, claims, (start, final), floor)
+    claims = without_lesser_unknowns(claims, parts)
+    parts = explain_error(prediction.model, observed, claims, (start, final), floor)
+    errors = [each.after for each in fits]
+    parts = tuple(replace(each, removal=as_found(each.removal, errors, observed)) for each in parts)
+    claims = tuple(replace(each, removal=as_found(each.removal, errors, observed)) for each in claims)
+    claims = with_minor_ones(claims, parts)
+    unnamed = _unnamed_gain(fits, tuning.claims) if not claims else None
+    status: Status = "mismatch" if claims else "none" if unnamed is None else "inconclusive"
+    base, covariance = prediction.model.base_parameters()
+    return Diagnosis(
+        recording=recording,
+        simulation=simulation,
+        status=status,
+        observed=observed,
+        nominal=design.target,
+        refit=refit,
+        final=final,
+        inertial=inertial_parameters(prediction.model),
+        model=found,
+        named_model=alone,
+        base_values=base,
+        base_covariance=covariance,
+        claims=claims,
+        parts=parts,
+        is_plain=is_plain_best,
+        friction=joint_friction(replace(model, state=with_usual(model, model.state.groups))),
+        located=locate_excess(start, floor, observed, tuning.location) if claims else (),
+        unexplained=tuple(
+            Unexplained(each.joint + 1, float(np.clip(each.share, 0, 1)), each.depends_on) for each in remains
+        ),
+        fit=fits,
+        steps=model.steps,
+        looks=count_looks(model),
+        settings=settings,
+        unnamed=unnamed,
+    )
+
+
+def _unnamed_gain(fits: Sequence[JointFit], tuning: ClaimTuning) -> JointFit | None:
+    """The joint whose held-out error falls most with parts that are present and not claimed, where that is much."""
+    worst = min(fits, key=lambda each: each.after / max(each.before, 1e-300))
+    return worst if worst.after < (1 - tuning.max_unnamed_gain) * worst.before else None
+
+
+def _is_beaten_by(plain: Yardstick, prediction: Prediction) -> bool:
+    """Whether plain least squares predicts blocks of the runs that identify better than the model that predicts."""
+    judged, arm = prediction.judged, prediction.model.design.simulation.arm
+    try:
+        errors = squared_errors(arm, judged, prediction.block, plain.cutoff_hz)
+    except DataError:
+        return False
+    return predicts_better(
+        errors, prediction.squared_errors, prediction.model.design.settings.tuning.prediction.min_trial_gain
+    )
+
+
+def _delivered(plain: Yardstick, found: TorqueModel, observed: Observed, claims: Sequence[Claim]) -> TorqueModel:
+    """Plain least squares in the place of a model, with its robot and provenance."""
+    model = with_claims(
+        plain.as_torque_model(identification_runs(observed)), [(each.effect, each.joint) for each in claims]
+    )
+    return replace(model, robot=found.robot, provenance={**found.provenance, "model": "plain least squares"})
+
+
+def _settings_used(settings: Settings) -> dict[str, float | str | bool]:
+    """Guards, cut-off, and the tuning numbers that are not as usual."""
+    changed = changed_numbers(settings.tuning)
+    shown = {name: str(list(each)) if isinstance(each, tuple) else each for name, each in changed.items()}
+    return {**asdict(settings.guards), "cutoff_hz": settings.tuning.data.cutoff_hz, **shown}

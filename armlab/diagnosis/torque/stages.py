@@ -1,0 +1,82 @@
+"""How a name gets claimed: the stages of a diagnosis in their order, each from a belief to a belief."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from armlab.diagnosis.torque.belief import Belief
+from armlab.diagnosis.torque.columns.design import DesignMatrix
+from armlab.diagnosis.torque.evidence.added_body import possible_links, with_possible_bodies
+from armlab.diagnosis.torque.evidence.friction_curves import find_friction_curves, name_friction_curves
+from armlab.diagnosis.torque.evidence.plausibility import (
+    unclaim_implausible,
+    withdraw_contradicted,
+    withdraw_implausible,
+)
+from armlab.diagnosis.torque.evidence.pruning import prefer_one_body, prune, scan_what_is_left
+from armlab.diagnosis.torque.names.additions import add_probable, with_likeliest_names
+from armlab.diagnosis.torque.names.expected_parts import claim_expected_parts
+from armlab.diagnosis.torque.predict.prediction import fit_prediction
+from armlab.diagnosis.torque.search.fitted_model import Progress, fit_background, search_effects
+from armlab.effects.library import library
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A step of a diagnosis. sentence: what it does; message: what a waiting user is told, where that changes."""
+
+    run: Callable[[Belief], Belief]
+    sentence: str
+    message: str = ""
+
+
+def predict(belief: Belief) -> Belief:
+    """The same with the model that predicts, whose bodies can exist."""
+    return replace(belief, prediction=with_possible_bodies(fit_prediction(belief.model)))
+
+
+# A search comes first: links and usual friction are fitted, what they leave is scanned for candidates, and the set of
+# effects with the best score is searched, round by round with better noise and shapes (`search_effects`).
+NAMES_THAT_HOLD = (
+    Stage(
+        prune,
+        "The weakest effect that fails a test leaves, until all pass; then the search looks once more.",
+        "testing claims",
+    ),
+    Stage(scan_what_is_left, "What passes is taken off, and scans look for gaps, pushes and waves in the rest."),
+    Stage(find_friction_curves, "A free curve of friction replaces formulas where it is clearly better than each."),
+    Stage(prefer_one_body, "One body that can exist replaces loose masses; bodies that cannot exist leave."),
+    Stage(withdraw_implausible, "Friction with numbers that no arm has gives way to usual friction."),
+    Stage(withdraw_contradicted, "A name leaves where as much structure is left at its joint as it explains."),
+    Stage(name_friction_curves, "Structure that depends on the velocity of its joint alone is a curve of friction."),
+    Stage(possible_links, "Links that are off keep a name only if they are bodies with these numbers."),
+)
+NAMES_THAT_ARE_PROBABLE = (
+    Stage(
+        with_likeliest_names,
+        "Each effect takes the likeliest name of its finding, by learnt weights.",
+        "weighing names",
+    ),
+    Stage(add_probable, "Effects that failed a test and are probable all the same are added, one after the other."),
+    Stage(
+        predict,
+        "The model that predicts is chosen on blocks of the runs that identify: names, and what is only present.",
+        "fitting the model that predicts",
+    ),
+    Stage(claim_expected_parts, "Usual friction and offsets that the prediction needs are claimed.", "stating numbers"),
+    Stage(unclaim_implausible, "Names with numbers that nobody believes stay in the model without a claim."),
+)
+
+
+def find_names(design: DesignMatrix, seed: int, progress: Progress) -> Belief:
+    """The names that hold of what a search finds. seed: of the surrogates' random waves."""
+    searched = Belief(search_effects(fit_background(design, library(), seed, progress), progress))
+    return run_stages(NAMES_THAT_HOLD, searched, progress)
+
+
+def run_stages(stages: Sequence[Stage], belief: Belief, progress: Progress) -> Belief:
+    """A belief after some stages."""
+    for stage in stages:
+        if stage.message:
+            progress(stage.message)
+        belief = stage.run(belief)
+    return belief
