@@ -40,6 +40,7 @@ _FILE = click.Path(path_type=Path)
     help="Write the table of joints for a paper, too: joints.tex, .pdf, .svg; repeatable.",
 )
 @click.option("--verbose", is_flag=True, help="Print every finding with its evidence, what is left, and all errors.")
+@click.option("--why", multiple=True, metavar="EFFECT@JOINT", help="Say why this is a finding, or none; repeatable.")
 @prints_result
 def diagnose(
     recordings: tuple[Path, ...],
@@ -55,6 +56,7 @@ def diagnose(
     mcap: bool,
     tables: tuple[str, ...],
     verbose: bool,
+    why: tuple[str, ...],
 ) -> ResultLines:
     """Find the physics that the simulation of RECORDING lacks.
 
@@ -77,6 +79,8 @@ def diagnose(
     if old is None and len(recordings) > 1:
         raise InputError("one recording is diagnosed at a time: give --compare to compare several")
     motion_only = is_motion_only(recordings[0])
+    if why and (old is not None or motion_only or only_setup):
+        raise InputError("--why: only a diagnosis of torque has a log of names, leave it out")
     if motion_only and (baseline or without or as_read or only_setup):
         raise InputError("a recording of motion only takes --out, --set, --mcap, --table, --compare: leave out others")
     if any(change.startswith("motion.") != motion_only for change in changes):
@@ -97,8 +101,9 @@ def diagnose(
         return compare_recordings((old, *recordings), out, baseline, seed, _parse_dates(dates), tell_progress)
     from armlab.report.torque.write import diagnose_recording
 
+    reading = as_read, only_setup
     return diagnose_recording(
-        recordings[0], out, baseline, seed, without, changes, as_read, only_setup, tell_progress, mcap, tables, verbose
+        recordings[0], out, baseline, seed, without, changes, *reading, tell_progress, mcap, tables, verbose, why
     )
 
 

@@ -9,7 +9,7 @@ from armlab.diagnosis.formats import Status
 from armlab.diagnosis.torque.evidence.evidence import Evidence
 from armlab.diagnosis.torque.rows.data import Observed
 from armlab.diagnosis.torque.rows.simulation import Simulation
-from armlab.diagnosis.torque.search.search import Step
+from armlab.diagnosis.torque.search.search import NotTaken, Step
 from armlab.effects.contract import UNKNOWN, Candidate
 from armlab.effects.parameters import ParameterValue
 from armlab.identification.torque_model import TorqueModel
@@ -228,11 +228,12 @@ class Diagnosis:
     the model found, without surrogates of what is unknown. inertial: (10 * joints,) of the model found. model: the
     same to predict with; named_model: fitted with the named effects alone. is_plain: whether plain least squares is
     delivered in the place of the model that predicts, because it predicts the runs that identify better.
-    steps: the log of the search. looks: how many candidates and shapes were compared. signs: warnings about
-    limits, names, clock and standstill of the recording as it is. setup: how it is to be read, None where that was not
-    asked; `recording` is then as it should be read. weighed: the names of each finding, and of what was not probable
-    enough for one. reason: why no model was fitted, empty where one was. unnamed: the joint that is predicted much
-    better without any finding. summary: in words, empty where only the engine was asked.
+    steps: the log of the search and the tests. not_taken: effects that the model of the names does not hold. looks: how
+    many candidates and shapes were compared. signs: warnings about limits, names, clock and standstill of the recording
+    as it is. setup: how it is to be read, None where that was not asked; `recording` is then as it should be read.
+    weighed: the names of each finding, and of what was not probable enough for one. reason: why no model was fitted,
+    empty where one was. unnamed: the joint that is predicted much better without any finding. summary: in words, empty
+    where only the engine was asked.
     """
 
     recording: Recording
@@ -256,6 +257,7 @@ class Diagnosis:
     unexplained: tuple[Unexplained, ...] = ()
     fit: tuple[JointFit, ...] = ()
     steps: tuple[Step, ...] = ()
+    not_taken: tuple[NotTaken, ...] = ()
     looks: int = 0
     seconds: float = 0.0
     signs: tuple[Finding, ...] = ()

@@ -132,7 +132,7 @@ def find_load(recording: Recording, setting: PayloadSetting, settings: Settings,
     if design.prior is None:
         raise InputError(f"--without is needed: links of the robot {recording.arm.name} have no mass")
     bare = _with_counterbalance(_without_bodies(find_names(design, 0, progress).model, link), setting.counterbalanced)
-    candidates = [bare.solver.groups[each].candidate for each in bare.state.groups]
+    candidates = [bare.candidate(each) for each in bare.state.groups]
     beside = tuple(
         at_place(recording.arm, each.facts.words, each.effect, each.joint, each.joints) for each in candidates
     )
@@ -175,7 +175,7 @@ def _with_counterbalance(model: FittedModel, joint: int | None) -> FittedModel:
     if joint is None:
         return model
     spring = SpringCompensator.at(model.design.simulation.arm, joint)
-    inside = [model.solver.groups[each].candidate for each in model.state.groups]
+    inside = [model.candidate(each) for each in model.state.groups]
     if any(each.effect == spring.effect and each.joint == joint for each in inside):
         return model
     return _with_candidate(model, spring)[0]
@@ -191,7 +191,7 @@ def _with_candidate(model: FittedModel, candidate: Candidate) -> tuple[FittedMod
 
 def _numbers(model: FittedModel, group: int) -> dict[str, Number]:
     """The numbers of a body that a model adds, by name: those that stand for themselves, and its centre."""
-    wide, candidate = extend_with_shapes(model), model.solver.groups[group].candidate
+    wide, candidate = extend_with_shapes(model), model.candidate(group)
     values, covariance = model.solver.values(model.fit, group), wide.covariance(group)
     ten, slopes = _ten(candidate, values), _slopes(candidate, values)
     clear = candidate.clear if isinstance(candidate, Payload) else tuple(range(10))

@@ -49,6 +49,7 @@ from armlab.diagnosis.torque.search.fitted_model import (
     FittedModel,
     inertial_parameters,
 )
+from armlab.diagnosis.torque.search.search import Search
 from armlab.diagnosis.torque.search.surrogate import Structure
 from armlab.diagnosis.tuning import ClaimTuning, changed_numbers
 from armlab.identification.torque_model import TorqueModel
@@ -177,6 +178,7 @@ def _assemble(
         ),
         fit=fits,
         steps=model.steps,
+        not_taken=tuple(Search(model.solver, design.settings, True, 0).not_taken(model.state)),
         looks=count_looks(model),
         settings=settings,
         unnamed=unnamed,

@@ -23,6 +23,7 @@ from armlab.report.signals_file import SIGNALS_FILE, check_signals_writer, diagn
 from armlab.report.torque import content, measured
 from armlab.report.torque.gallery import Gallery, draw_gallery
 from armlab.report.torque.residuals import select_residuals
+from armlab.report.torque.steps_file import parse_place, steps_texts, why_lines
 from armlab.report.torque.verdict import first_screen, verdict_lines
 from armlab.report.verdict_files import (
     PREDICTED_FOLDER,
@@ -105,6 +106,7 @@ def diagnose_recording(
     with_signals: bool = False,
     tables: Sequence[str] = (),
     verbose: bool = False,
+    why: Sequence[str] = (),
 ) -> ResultLines:
     """Diagnoses a recording, writes verdict.json, report.html, model.yaml and figures, and yields lines to print.
 
@@ -114,7 +116,8 @@ def diagnose_recording(
     numbers with other values, like `noise.max_order=8`. as_read: the reading of the recording is not doubted.
     only_setup: nothing but the reading is asked. progress: called with the name of each step. with_signals: whether
     `signals.mcap` is written. tables: forms in which the table of joints is written, too (`TABLE_FORMS`). verbose:
-    whether the lines tell of every finding. Raises InputError, in one line, for a recording that cannot be used, an
+    whether the lines tell of every finding. why: effects as EFFECT@JOINT of which is told why they are named or not.
+    Raises InputError, in one line, for a recording that cannot be used, an
     unknown guard or an unknown tuning number.
     """
     if with_signals:
@@ -124,6 +127,7 @@ def diagnose_recording(
     for change in changes:
         settings = vary(settings, *parse_change(change))
     recording = load_recording(folder)
+    places = [parse_place(each, recording.arm) for each in why]
     check_output_folder(out, recording)
     try:
         diagnosis = diagnose(recording, chosen, seed, settings, progress, as_read, only_setup)
@@ -137,7 +141,12 @@ def diagnose_recording(
     options += [word for form in dict.fromkeys(tables) for word in ("--table", form)]
     command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out), *options])
     pages = verdict_texts(diagnosis, out) | report_texts(diagnosis, command)
-    texts: dict[str, str | bytes] = {**pages, **names_texts(diagnosis.weighed, settings), **predicted_texts(diagnosis)}
+    texts: dict[str, str | bytes] = {
+        **pages,
+        **names_texts(diagnosis.weighed, settings),
+        **steps_texts(diagnosis),
+        **predicted_texts(diagnosis),
+    }
     if diagnosis.claims:
         texts |= table_files("joints", measured.joint_table(diagnosis), tables)
     moved = None
@@ -146,6 +155,8 @@ def diagnose_recording(
         texts[SIGNALS_FILE], moved = signals_content(diagnosis_tracks(diagnosis), joints)
     written = write_texts(texts, out)
     yield from verdict_lines(diagnosis, verbose)
+    for effect, joint in places:
+        yield from why_lines(diagnosis, effect, joint)
     pictures = sum(name.startswith(FIGURES_FOLDER) for name in texts)
     files = ", ".join(name for name in texts if not name.startswith((FIGURES_FOLDER, PREDICTED_FOLDER)))
     more = f", {pictures} pictures in {FIGURES_FOLDER}" if pictures else ""

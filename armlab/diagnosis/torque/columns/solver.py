@@ -17,6 +17,7 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.torque.columns.columns import Group, Moments
 from armlab.diagnosis.torque.columns.links import LinkPrior, Widths
 from armlab.diagnosis.tuning import SolverTuning
+from armlab.effects.contract import Candidate
 
 MAX_OVERSHOOT = 0.1  # of a law of the simulation, by which a finding may take off more than all of it (chosen by eye)
 
@@ -90,12 +91,16 @@ class Solver:
             out[group.columns] += 1 / (scale * self.moments.lengths[group.columns]) ** 2
         return out
 
+    def candidate(self, group: int) -> Candidate:
+        """The effect of a group of columns, at its place."""
+        return self.groups[group].candidate
+
     def objection(self, group: int, values: Array, covariance: Array) -> str | None:
         """What physics says against a group with these coefficients beside those of the simulation.
 
         Where the arm does not have a law of the simulation, the group takes it off, and a little more by chance.
         """
-        candidate, present = self.groups[group].candidate, (1 + MAX_OVERSHOOT) * self.simulated[group]
+        candidate, present = self.candidate(group), (1 + MAX_OVERSHOOT) * self.simulated[group]
         return candidate.absurdity(values) or candidate.objection(values + present, covariance)
 
     @cached_property
@@ -133,7 +138,7 @@ class Solver:
     def contained(self, number: int) -> tuple[int, ...]:
         """Numbers of the simpler effects that a group contains and has to be better than."""
         if number not in self._contained:
-            own = self.groups[number].candidate
+            own = self.candidate(number)
             self._contained[number] = tuple(
                 other
                 for other, each in enumerate(self.groups)

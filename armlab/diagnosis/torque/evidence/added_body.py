@@ -16,7 +16,7 @@ from armlab.diagnosis.torque.columns.links import Widths
 from armlab.diagnosis.torque.columns.solver import Solver, State
 from armlab.diagnosis.torque.predict.prediction import Prediction
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, inertial_parameters
-from armlab.diagnosis.torque.search.search import Step
+from armlab.diagnosis.torque.search.search import FailedTest, Step
 from armlab.effects.links import (
     BODY_SIZE_M,
     EIGENVALUE_TOLERANCE,
@@ -216,7 +216,8 @@ def possible_links(belief: Belief) -> Belief:
     found = _split_among_bodies(belief.model)
     kept = {link: each for link, each in links.items() if is_possible_body(found[link], EIGENVALUE_TOLERANCE)}
     why = "no body has the mass, centre and inertia that these data give it"
-    gone = tuple(Step(f"withdrawn: link {link + 1}: {why}", 0.0) for link in links if link not in kept)
+    failed = FailedTest("bodies that can exist", why)
+    gone = tuple(Step(f"withdrawn: link {link + 1}: {why}", 0.0, failed) for link in links if link not in kept)
     return replace(belief.with_steps(*gone), links=kept)
 
 
@@ -349,7 +350,7 @@ def _stands_in(model: FittedModel, trial: BodyTrial) -> bool:
 
 
 def _is_possible(model: FittedModel, group: int) -> bool:
-    ten = model.solver.groups[group].candidate.added_body(model.solver.values(model.fit, group))
+    ten = model.candidate(group).added_body(model.solver.values(model.fit, group))
     return ten is not None and is_possible_body(ten)
 
 
@@ -400,7 +401,7 @@ def with_possible_bodies(prediction: Prediction) -> Prediction:
     if not model.design.settings.guards.physics_signs:
         return prediction
     for group in payload_groups(model):
-        ten = model.solver.groups[group].candidate.added_body(model.solver.values(model.fit, group))
+        ten = model.candidate(group).added_body(model.solver.values(model.fit, group))
         if ten is None or not is_possible_body(ten):
             body = fit_body(model, model.state.minus(group), group, _link(model, group))
             model.solver.hold(model.state, body.coefficients)
@@ -408,8 +409,8 @@ def with_possible_bodies(prediction: Prediction) -> Prediction:
 
 
 def _names(model: FittedModel, groups: Sequence[int]) -> str:
-    return " and ".join(f"{model.solver.groups[each].candidate.effect} {_link(model, each)}" for each in groups)
+    return " and ".join(f"{model.candidate(each).effect} {_link(model, each)}" for each in groups)
 
 
 def _link(model: FittedModel, group: int) -> int:
-    return model.solver.groups[group].candidate.joints[0]
+    return model.candidate(group).joints[0]

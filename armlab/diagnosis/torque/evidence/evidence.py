@@ -197,7 +197,7 @@ class Judge:
         spread, losses = self.compared.covariance_of(state), solver.losses(fit)
         out = {}
         for group in state.groups:
-            candidate = solver.groups[group].candidate
+            candidate = solver.candidate(group)
             values = solver.values(fit, group)
             objection = solver.objection(group, values, self._covariance(fit, spread, group))
             tested = max(self._tested(fit, spread, group), self._in_wider_links(group))
@@ -223,7 +223,7 @@ class Judge:
         p_value = self.compared.covariance_of(self.state).p_value(fit.coefficients[columns], place, largest)
         rows = self.model.solver.groups[groups[0]].candidate.rows
         evidence = self._against(less, (p_value, 1), rows, fit.score - self.model.solver.fit(less).score)
-        return replace(evidence, usual=all(self.model.solver.groups[each].candidate.facts.usual for each in groups))
+        return replace(evidence, usual=all(self.model.candidate(each).facts.usual for each in groups))
 
     def links(self) -> dict[int, Evidence]:
         """Evidence for each link (from 0) that is off."""
@@ -291,7 +291,7 @@ class Judge:
         def lead(law: Array) -> float:
             return rest.gain(block, whiten) - rest.gain(replace(block, values=law[:, None]), whiten)
 
-        inside = (model.solver.groups[each].candidate for each in self.state.groups)
+        inside = (model.candidate(each) for each in self.state.groups)
         remembers = any(each.is_friction_of(joint + 1) and each.of_time for each in inside)
         tuning = design.settings.tuning
         creep = tuning.data.creep_ratio if remembers else None
@@ -312,7 +312,7 @@ class Judge:
         A law without nonlinear parameters is usual friction by direction; it is compared as other special laws are.
         """
         solver, state, simpler = self.model.solver, self.state, self.simpler(group)
-        candidate = solver.groups[group].candidate
+        candidate = solver.candidate(group)
         numbers = int(solver.ranks[group]) + len(candidate.shape)
         if not candidate.shape or set(simpler) & set(state.groups) or numbers > solver.ranks[list(simpler)].sum():
             return False
@@ -344,7 +344,7 @@ class Judge:
             return beyond, "usual friction is nearly as likely"
         if formula == usual:
             return beyond, None
-        rows, tested = solver.groups[group].candidate.rows, (beyond.p_value, self.looks(group))
+        rows, tested = solver.candidate(group).rows, (beyond.p_value, self.looks(group))
         against = self._against(formula, tested, rows, solver.fit(self.state).score - solver.fit(formula).score)
         weaker = replace(min((beyond, against), key=lambda each: each.gain), score=min(beyond.score, against.score))
         if weaker.score < tuning.pruning.least_evidence:
@@ -364,7 +364,7 @@ class Judge:
     def _tested(self, fit: Fit, spread: BlockCovariance, group: int) -> float:
         columns = self.model.solver.groups[group].columns
         largest, place = self.model.design.settings.tuning.blocks.max_variance_ratio, self._place(fit, group)
-        candidate = self.model.solver.groups[group].candidate
+        candidate = self.model.candidate(group)
         if candidate.facts.single_event:
             inflation = self.compared.event_inflation(fit.state, place, candidate.rows[0])
             spread = replace(spread, covariance=spread.covariance * inflation)

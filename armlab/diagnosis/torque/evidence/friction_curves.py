@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.solver import State
-from armlab.diagnosis.torque.evidence.pruning import withdraw
+from armlab.diagnosis.torque.evidence.pruning import test_again
 from armlab.diagnosis.torque.evidence.unknown import (
     is_form_error,
     is_structured,
@@ -30,7 +30,7 @@ def find_friction_curves(belief: Belief) -> Belief:
             continue
         (group,) = set(state.groups) - set(model.state.groups)
         step = Step(f"friction curve at joint {joint}", model.solver.fit(state).score)
-        tried = withdraw(belief.with_state(state, step), frozenset(), "")
+        tried = test_again(belief.with_state(state, step))
         if group in tried.model.state.groups:
             belief = tried
     return belief

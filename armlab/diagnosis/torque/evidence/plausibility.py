@@ -19,13 +19,15 @@ from armlab.diagnosis.torque.evidence.unknown import names_contradicted_by_resid
 from armlab.diagnosis.torque.names.intervals import extend_with_shapes
 from armlab.diagnosis.torque.rows.data import Observed
 from armlab.diagnosis.torque.search.fitted_model import FittedModel
-from armlab.diagnosis.torque.search.search import Step
+from armlab.diagnosis.torque.search.search import FailedTest, Step
 from armlab.diagnosis.torque.search.surrogate import Structure
 from armlab.diagnosis.tuning import PlausibilityTuning
 from armlab.effects.contract import Candidate, Kind, Parameter
 from armlab.effects.links import SolidBody
 from armlab.effects.parameters import ParameterValue, parameter_values
 
+NOT_CLAIMED = "present, not claimed"
+CONTRADICTED = FailedTest("what is left at the joint", "what is left at its joint is no less structured")
 ROUNDING = 1e-9  # of a link's torque at the joint that shows it best: a joint with less does not feel it
 
 
@@ -39,7 +41,7 @@ def withdraw_implausible(belief: Belief) -> Belief:
     withdrawn = frozenset[int]()
     while doubts := _doubtful_friction(belief):
         weakest = min(doubts, key=lambda group: _strength(belief.effects[group]))
-        belief = withdraw(belief, frozenset({weakest}), doubts[weakest])
+        belief = withdraw(belief, {weakest: doubts[weakest]})
         withdrawn |= {weakest}
     again = look_again(belief, withdrawn) if withdrawn else belief
     return belief if _doubtful_friction(again) else again
@@ -52,8 +54,8 @@ def withdraw_contradicted(belief: Belief) -> Belief:
     belief, withdrawn = with_what_is_left(belief), frozenset[int]()
     while doubtful := names_contradicted_by_residual(belief.effects, belief.left, belief.tuning) - withdrawn:
         withdrawn |= doubtful
-        why = "what is left at its joint is no less structured"
-        belief = with_what_is_left(withdraw_implausible(withdraw(belief, doubtful, why, withdrawn)))
+        failed = dict.fromkeys(sorted(doubtful), CONTRADICTED)
+        belief = with_what_is_left(withdraw_implausible(withdraw(belief, failed, withdrawn)))
     wrong = names_contradicted_by_residual(belief.links, belief.left, belief.tuning)
     return replace(belief, links={link: each for link, each in belief.links.items() if link not in wrong})
 
@@ -63,7 +65,7 @@ def _strength(evidence: Evidence) -> tuple[bool, float]:
     return evidence.usual, evidence.score
 
 
-def _doubtful_friction(belief: Belief) -> dict[int, str]:
+def _doubtful_friction(belief: Belief) -> dict[int, FailedTest]:
     facts = {group: belief.model.candidate(group).facts for group in belief.effects}
     doubts = doubtful_names(belief.model, belief.effects)
     return {group: why for group, why in doubts.items() if facts[group].contains or facts[group].usual}
@@ -76,16 +78,15 @@ def unclaim_implausible(belief: Belief) -> Belief:
     unknown it is how the log was made.
     """
     doubts = doubtful_names(belief.model, belief.effects, exact=not remaining(belief))
-    steps = []
-    for group, why in doubts.items():
-        candidate = belief.model.candidate(group)
-        steps.append(Step(f"present, not claimed: {candidate.effect} {candidate.joint}: {why}", 0.0))
+    steps = [Step.against(belief.model.candidate(group), test, NOT_CLAIMED) for group, test in doubts.items()]
     kept = {group: each for group, each in belief.effects.items() if group not in doubts}
     present = {group: belief.effects[group] for group in doubts}
     return replace(belief.with_steps(*steps), effects=kept, present=present)
 
 
-def doubtful_names(model: FittedModel, effects: Mapping[int, Evidence], *, exact: bool = False) -> dict[int, str]:
+def doubtful_names(
+    model: FittedModel, effects: Mapping[int, Evidence], *, exact: bool = False
+) -> dict[int, FailedTest]:
     """Why the numbers of a name cannot be believed, for each group of which that is so; exact: of a model that is."""
     if not effects or not model.design.settings.guards.physics_signs:
         return {}
@@ -94,7 +95,7 @@ def doubtful_names(model: FittedModel, effects: Mapping[int, Evidence], *, exact
     out = {}
     for group, evidence in effects.items():
         coefficients = model.solver.values(model.fit, group)
-        candidate = model.solver.groups[group].candidate.first_name(coefficients, model.design.scenes)
+        candidate = model.candidate(group).first_name(coefficients, model.design.scenes)
         covariance = wide.covariance(group)
         values = parameter_values(candidate, coefficients, covariance, wide.factor)
         if model.solver.simulated[group].any():
@@ -104,7 +105,7 @@ def doubtful_names(model: FittedModel, effects: Mapping[int, Evidence], *, exact
         if len(coefficients) == 1 and abs(coefficients[0]) <= wide.factor * np.sqrt(covariance[0, 0]):
             reason = reason or "its size may be zero"
         if reason is not None:
-            out[group] = reason
+            out[group] = FailedTest("numbers that can be believed", reason)
     return out
 
 
@@ -134,7 +135,8 @@ def links_that_data_tell(
         if reason is None:
             kept.append(each)
         else:
-            steps.append(Step(f"present, not claimed: {each.effect} {each.joint}: {reason}", 0.0))
+            failed = FailedTest("links of which these data tell", reason)
+            steps.append(Step(f"{NOT_CLAIMED}: {each.effect} {each.joint}: {reason}", 0.0, failed))
     return replace(model, steps=tuple(steps)), tuple(kept)
 
 

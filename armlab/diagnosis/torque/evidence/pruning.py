@@ -1,5 +1,6 @@
 """Only what passes every test stays: the weakest effect that fails one leaves, and the rest is searched anew."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from armlab.diagnosis.settings import Settings
@@ -17,28 +18,32 @@ from armlab.diagnosis.torque.evidence.added_body import (
 from armlab.diagnosis.torque.evidence.evidence import Evidence, Judge
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, follow_model, scan_residual, with_design
 from armlab.diagnosis.torque.search.refine import refine_shapes
-from armlab.diagnosis.torque.search.search import Search, Step
+from armlab.diagnosis.torque.search.search import FailedTest, Search, Step
 
 
-def reason_to_reject(evidence: Evidence, settings: Settings) -> str | None:
-    """Why an effect may not be claimed; None where it passes."""
+def first_failed_test(evidence: Evidence, settings: Settings) -> FailedTest | None:
+    """The first test that an effect does not pass; None where it may be claimed."""
     guards, tuning = settings.guards, settings.tuning.pruning
     if guards.physics_signs and evidence.objection is not None:
-        return evidence.objection
-    if evidence.corrected > tuning.level:
-        return f"p = {evidence.corrected:.2g} after correction"
-    if not evidence.usual and evidence.score < tuning.least_evidence and evidence.gain < tuning.self_evident_gain:
-        return f"log evidence {evidence.score:.0f}: too little for a name"
+        return FailedTest("laws of physics", evidence.objection)
+    p_value, score = evidence.corrected, evidence.score
+    if p_value > tuning.level:
+        return FailedTest("significance", f"p = {p_value:.2g} after correction", p_value, tuning.level)
+    if not evidence.usual and score < tuning.least_evidence and evidence.gain < tuning.self_evident_gain:
+        text = f"log evidence {score:.0f}: too little for a name"
+        return FailedTest("log evidence", text, score, tuning.least_evidence)
     least = tuning.least_gain * (1.0 if evidence.repeatable else tuning.single_event_share)
     if guards.heldout_gain and evidence.gain < least:
-        return f"held-out gain {100 * evidence.gain:.2g} %"
+        return FailedTest("held-out gain", f"held-out gain {100 * evidence.gain:.2g} %", evidence.gain, least)
     if not evidence.repeatable:
         return None
     level = tuning.large_gain_level if evidence.gain > tuning.large_gain else tuning.held_out_level
     if guards.heldout_gain and not evidence.usual and evidence.held_p > level:
-        return f"held-out gain not sure (p = {evidence.held_p:.2g})"
+        text = f"held-out gain not sure (p = {evidence.held_p:.2g})"
+        return FailedTest("sureness of the held-out gain", text, evidence.held_p, level)
     if guards.heldout_gain and evidence.worse:
-        return f"validation gets worse by {-100 * evidence.validation_gain:.2g} %"
+        text = f"validation gets worse by {-100 * evidence.validation_gain:.2g} %"
+        return FailedTest("validation runs", text, evidence.validation_gain, 0.0)
     return None
 
 
@@ -88,16 +93,19 @@ def _search_again(belief: Belief, fixed: bool) -> Belief:
     return replace(belief, model=replace(model, state=state, steps=tuple(steps)))
 
 
-def withdraw(belief: Belief, groups: frozenset[int], why: str, before: frozenset[int] = frozenset()) -> Belief:
+def test_again(belief: Belief) -> Belief:
+    """The same without what no longer passes, see `withdraw`."""
+    return withdraw(belief, {})
+
+
+def withdraw(belief: Belief, failed: Mapping[int, FailedTest], before: frozenset[int] = frozenset()) -> Belief:
     """The same without some groups, and without what no longer passes; usual friction in the place of special laws.
 
-    before: groups that were withdrawn earlier; nor do they come back.
+    failed: why, for each group. before: groups that were withdrawn earlier; nor do they come back.
     """
     model = belief.model
-    judge, steps = Judge(model, model.state), list[Step]()
-    for group in groups:
-        candidate = model.candidate(group)
-        steps.append(Step(f"withdrawn: {candidate.effect} {candidate.joint}: {why}", 0.0))
+    judge, groups = Judge(model, model.state), frozenset(failed)
+    steps = [Step.against(model.candidate(group), test) for group, test in failed.items()]
     back = {other for group in groups for other in judge.in_place_of(group)}
     state = State(tuple(sorted(set(model.state.groups) - groups | back)), model.state.widths)
     less = belief.with_state(state, *steps)
@@ -161,10 +169,11 @@ def prefer_one_body(belief: Belief) -> Belief:
     """
     held = hold_body(belief.model)
     if held is not belief.model:
-        tested = withdraw(replace(belief, model=held), frozenset(), "")
+        tested = test_again(replace(belief, model=held))
         belief = tested if payload_groups(tested.model) else belief
-    impossible = frozenset(impossible_bodies(belief.model))
-    return withdraw(belief, impossible, "no body has such a mass, centre and inertia") if impossible else belief
+    failed = FailedTest("bodies that can exist", "no body has such a mass, centre and inertia")
+    impossible = dict.fromkeys(impossible_bodies(belief.model), failed)
+    return withdraw(belief, impossible) if impossible else belief
 
 
 def _settle_links(belief: Belief) -> Belief:
@@ -184,7 +193,7 @@ def _remove_failing(belief: Belief) -> Belief:
         groups, state = model.solver.groups, model.state
         judge = Judge(model, state)
         effects = judge.effects()
-        bad = {group: why for group, each in effects.items() if (why := reason_to_reject(each, settings)) is not None}
+        bad = {group: why for group, each in effects.items() if (why := first_failed_test(each, settings)) is not None}
         if not bad:
             held = find_body_anew(model)
             if held is model or found_anew >= settings.tuning.pruning.max_cycles:
@@ -194,9 +203,7 @@ def _remove_failing(belief: Belief) -> Belief:
         weakest = min(bad, key=lambda group: (not judge.simpler(group), effects[group].score))
         gone = _groups_to_remove(judge, weakest)
         steps = list(model.steps)
-        for group in gone:
-            what = groups[group].candidate
-            steps.append(Step(f"withdrawn: {what.effect} {what.joint}: {bad.get(group, bad[weakest])}", 0.0))
+        steps += [Step.against(model.candidate(group), bad.get(group, bad[weakest])) for group in gone]
         places = {groups[group].place for group in gone}
         banned |= {number for number, each in enumerate(groups) if each.place in places}
         back = {other for group in gone for other in judge.in_place_of(group)}
@@ -207,9 +214,9 @@ def _remove_failing(belief: Belief) -> Belief:
 def _groups_to_remove(judge: Judge, weakest: int) -> set[int]:
     """The group that fails; usual friction beside a special law takes that law with it, if it is likelier alone."""
     solver, state = judge.model.solver, judge.state
-    joint = solver.groups[weakest].candidate.joint
-    special = {each for each in state.groups if judge.simpler(each) and solver.groups[each].candidate.joint == joint}
-    if not solver.groups[weakest].candidate.facts.usual or not special:
+    joint = solver.candidate(weakest).joint
+    special = {each for each in state.groups if judge.simpler(each) and solver.candidate(each).joint == joint}
+    if not solver.candidate(weakest).facts.usual or not special:
         return {weakest}
     usual = {other for group in special for other in judge.simpler(group)}
     plain = State(tuple(sorted(set(state.groups) - special | usual)), state.widths)
@@ -227,10 +234,11 @@ def _test_links(model: FittedModel) -> tuple[FittedModel, dict[int, Evidence] | 
     links = judge.links()
     if not links:
         return model, {}
-    passed = {link: each for link, each in links.items() if reason_to_reject(each, settings) is None}
+    passed = {link: each for link, each in links.items() if first_failed_test(each, settings) is None}
     together = judge.together()
-    if passed or reason_to_reject(together, settings) is None:
+    failed = first_failed_test(together, settings)
+    if passed or failed is None:
         return model, passed or {max(links, key=lambda link: links[link].score): together}
-    step = Step(f"withdrawn: links: {reason_to_reject(together, settings)}", 0.0)
+    step = Step(f"withdrawn: links: {failed.text}", 0.0, failed)
     back = State(state.groups, (0.0,) * len(state.widths or ()))
     return replace(model, state=back, steps=(*model.steps, step)), None

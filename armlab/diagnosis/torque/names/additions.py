@@ -152,7 +152,7 @@ def _with_name(model: FittedModel, answer: Member, least: float) -> Found | None
 
 
 def _candidate(model: FittedModel, group: int) -> Candidate:
-    return model.solver.groups[group].candidate
+    return model.candidate(group)
 
 
 def _may_be_added(model: FittedModel, search: Search, group: int) -> bool:

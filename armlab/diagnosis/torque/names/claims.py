@@ -75,7 +75,7 @@ def _effect_claim(model: FittedModel, wide: ShapedFit, group: int, place: int, e
     solver = model.solver
     columns = solver.groups[group].columns
     coefficients, covariance = solver.values(model.fit, group), wide.covariance(group)
-    candidate = solver.groups[group].candidate.first_name(coefficients, model.design.scenes)
+    candidate = solver.candidate(group).first_name(coefficients, model.design.scenes)
     own = np.zeros(model.moments.size)
     own[columns] = coefficients
     rivals = tuple(Rival(name, candidate.joint, candidate.joints, True) for name in candidate.identical)

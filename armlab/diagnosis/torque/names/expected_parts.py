@@ -11,7 +11,7 @@ from dataclasses import replace
 from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.solver import State
 from armlab.diagnosis.torque.evidence.evidence import Evidence, Judge
-from armlab.diagnosis.torque.evidence.pruning import reason_to_reject
+from armlab.diagnosis.torque.evidence.pruning import first_failed_test
 from armlab.diagnosis.torque.predict.parts import removal_of
 from armlab.diagnosis.torque.predict.prediction import Prediction
 from armlab.diagnosis.torque.search.fitted_model import FittedModel
@@ -53,7 +53,7 @@ def _that_matter(model: FittedModel, prediction: Prediction) -> Iterator[tuple[i
                 continue
             alike = [each for each in predicting.state.groups if _is_alike(predicting, each, joint, dissipates)]
             evidence = replace(judge.jointly(alike), usual=True)
-            if not removal_of(predicting, alike).is_minor and reason_to_reject(evidence, settings) is None:
+            if not removal_of(predicting, alike).is_minor and first_failed_test(evidence, settings) is None:
                 yield usual[_likeliest(predicting, alike, tuple(usual))], evidence
 
 
@@ -64,13 +64,13 @@ def _likeliest(model: FittedModel, alike: Sequence[int], usual: Sequence[int]) -
 
 
 def _is_usual(model: FittedModel, group: int, joint: int, dissipates: bool) -> bool:
-    candidate = model.solver.groups[group].candidate
+    candidate = model.candidate(group)
     return candidate.facts.usual and candidate.joint == joint and candidate.facts.dissipates == dissipates
 
 
 def _is_alike(model: FittedModel, group: int, joint: int, dissipates: bool) -> bool:
     """Whether a group is a friction law of a joint; its usual part that does not dissipate, if that is asked."""
-    candidate = model.solver.groups[group].candidate
+    candidate = model.candidate(group)
     if dissipates:
         return candidate.is_friction_of(joint)
     return _is_usual(model, group, joint, dissipates)

@@ -56,7 +56,7 @@ def extend_with_shapes(model: FittedModel) -> ShapedFit:
     extra = {joint: np.empty((bench.observed.rows, 0)) for joint in range(bench.observed.joints)}
     places, start, bounds = {}, len(fit.inverse), list[tuple[float, float]]()
     for group in fit.state.groups:
-        candidate = model.solver.groups[group].candidate
+        candidate = model.candidate(group)
         count = len(candidate.shape)
         if not count:
             continue
@@ -79,7 +79,7 @@ def extend_with_shapes(model: FittedModel) -> ShapedFit:
     precision = prior_precision(model.solver, fit, start)
     precision += np.diag(np.append(np.zeros(len(fit.inverse)), anywhere / shapes**2))
     for group in fit.state.groups:
-        known = model.solver.groups[group].candidate.known(model.solver.values(fit, group))
+        known = model.candidate(group).known(model.solver.values(fit, group))
         if known is not None:
             chosen = _numbers_of(model, group, places.get(group))
             units = _units(model, group, shapes, places.get(group))
@@ -105,7 +105,7 @@ def _units(model: FittedModel, group: int, shapes: Array, place: slice | None) -
 
 def _shape_derivative(model: FittedModel, group: int, which: int) -> Array:
     """Derivative of a group's filtered torque by one of its shapes, (rows, rows of the candidate)."""
-    candidate, values = model.solver.groups[group].candidate, model.solver.values(model.fit, group)
+    candidate, values = model.candidate(group), model.solver.values(model.fit, group)
     low, high = candidate.bounds[which]
     ends = []
     for sign in (1, -1):

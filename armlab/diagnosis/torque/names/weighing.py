@@ -58,7 +58,7 @@ class _Trial:
 def weigh_effect(model: FittedModel, group: int, claimed: Mapping[int, Evidence], left: Sequence[Structure]) -> Weighed:
     """The names of an effect of a model. claimed: all its effects; left: structure of its joints."""
     evidence, without, bent = claimed[group], model.state.minus(group), 0.0
-    candidate = model.solver.groups[group].candidate
+    candidate = model.candidate(group)
     trials = list(_in_place(model, without, group, beside=model.state))
     trials += _other_friction(model, without, group)
     if group in payload_groups(model) and model.design.prior is not None:
@@ -101,7 +101,7 @@ def weigh_addition(
 
     added: the state with it; evidence: of the group in that state. left: structure that the model leaves at its joints.
     """
-    candidate = model.solver.groups[group].candidate
+    candidate = model.candidate(group)
     none = {
         "left none": 1.0,
         "left p": negative_logarithm(evidence.corrected, 30) / 10,
@@ -238,7 +238,7 @@ def _bent_gain(model: FittedModel, without: State, group: int) -> float:
     It is the square of the torque that is scaled, with its sign or without. A scale that differs by the sign of the
     torque has a column for each sign: their sum is that torque.
     """
-    joint, columns = model.solver.groups[group].candidate.rows[0], model.solver.groups[group].columns
+    joint, columns = model.candidate(group).rows[0], model.solver.groups[group].columns
     law, whole = np.zeros((2, model.moments.size))
     law[columns], whole[columns] = model.solver.values(model.fit, group), 1.0
     own, scaled = (model.columns.torque_at(joint, each) for each in (law, whole))
@@ -263,7 +263,7 @@ def _log_gains(model: FittedModel, state: State, joint: int, torques: Array) -> 
 
 def _unusual_at(model: FittedModel, joint: Place, groups: Iterable[int]) -> int:
     """How many of these groups are at a joint and not its friction as every joint has it."""
-    facts = [model.solver.groups[each].candidate for each in groups]
+    facts = [model.candidate(each) for each in groups]
     return sum(each.joint == joint and not (each.facts.usual and each.facts.dissipates) for each in facts)
 
 
@@ -278,10 +278,10 @@ def _in_place(
     solver, tuning = model.solver, model.design.settings.tuning.naming
     search, known = Search(solver, model.design.settings, True, 0), _held_out(model)
     scores, seen = search.gains(without), set[tuple[str, Place]]()
-    taken = None if own is None else (solver.groups[own].candidate.effect, solver.groups[own].candidate.joint)
+    taken = None if own is None else (solver.candidate(own).effect, solver.candidate(own).joint)
     others = frozenset() if beside is None else _independent(search, scores, beside, tuning.max_independent)
     for number in map(int, np.argsort(-scores)):
-        candidate = solver.groups[number].candidate
+        candidate = solver.candidate(number)
         key = candidate.effect, candidate.joint
         full = len(seen) >= tuning.names
         if full and (taken is None or taken in seen):
@@ -317,7 +317,7 @@ def _other_friction(model: FittedModel, without: State, group: int) -> Iterator[
 
 def _sticks_where_it_acts(model: FittedModel, state: State, candidate: Candidate) -> bool:
     """Whether friction of a state that sticks acts where a law does."""
-    facts = [model.solver.groups[each].candidate for each in state.groups]
+    facts = [model.candidate(each) for each in state.groups]
     return any(each.facts.sticks and each.rows[0] in candidate.rows for each in facts)
 
 

@@ -88,7 +88,7 @@ def _fitted_terms(fitted: FittedModel, claims: Mapping[int, Claim]) -> Iterator[
     for group in fitted.state.groups:
         assert wide is not None
         claim = claims.get(group)
-        candidate = fitted.solver.groups[group].candidate
+        candidate = fitted.candidate(group)
         if claim is not None and claim.candidate is not None:
             candidate = claim.candidate
         coefficients = fitted.solver.values(fitted.fit, group)

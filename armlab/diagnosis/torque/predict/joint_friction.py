@@ -80,7 +80,7 @@ class _Sized:
 
     def _slopes(self, joint: int, group: int, speed: float) -> Array:
         """What each coefficient of a law adds to the friction at a speed, (coefficients,)."""
-        candidate = self.model.solver.groups[group].candidate
+        candidate = self.model.candidate(group)
         if _depends_on_speed_alone(candidate):
             columns = candidate.columns(self._instants(joint, speed))
             return np.asarray((columns[0, 0] - columns[1, 0]) / 2)

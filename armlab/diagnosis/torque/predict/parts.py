@@ -79,7 +79,7 @@ class _Parts:
         claimed = {group: claim for claim in self.claims for group in _groups_of(claim)}
         out: dict[tuple[str, Place], list[int]] = {}
         for group in self.model.state.groups:
-            candidate, claim = self.model.solver.groups[group].candidate, claimed.get(group)
+            candidate, claim = self.model.candidate(group), claimed.get(group)
             facts = candidate.facts if claim is None else claim_facts(claim)
             joint = candidate.joint if claim is None else claim.joint
             joints = candidate.joints if facts.where == "coupling" else ()
@@ -98,7 +98,7 @@ class _Parts:
         parts, torques = list[Part](), list[Array]()
         for (cause, (joint, joints)), groups in self._groups.items():
             removal = self.removal(self.model.state, _without(self.model.state, groups), self.rows_of(groups))
-            effects = tuple(self.model.solver.groups[each].candidate.effect for each in groups)
+            effects = tuple(self.model.candidate(each).effect for each in groups)
             parts.append(Part(cause, joint, joints, effects, self._claims_of(groups), removal))
             torques.append(self._torque_of_groups(groups))
         if self._links_are_off:
@@ -127,7 +127,7 @@ class _Parts:
 
     def rows_of(self, groups: Sequence[int]) -> list[int]:
         """Joints, from 0, whose torque groups change."""
-        return sorted({row for each in groups for row in self.model.solver.groups[each].candidate.rows})
+        return sorted({row for each in groups for row in self.model.candidate(each).rows})
 
     def _removal_of_links(self) -> Removal | None:
         """None where all links are free, so that nothing of them can be taken away alone."""

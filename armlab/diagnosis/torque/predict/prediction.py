@@ -93,7 +93,7 @@ def _may_help(law: Candidate) -> bool:
 
 def _of_found_size(named: FittedModel, number: int) -> Candidate:
     """A law of a model; a friction curve has a prior of its size, because slower signals do not tell of its details."""
-    law = named.solver.groups[number].candidate
+    law = named.candidate(number)
     if not isinstance(law, FrictionCurve):
         return law
     return replace(law, largest=float(np.abs(np.cumsum(named.solver.values(named.fit, number))).max()))
@@ -111,7 +111,7 @@ def _settled(model: FittedModel, tuning: PredictionTuning) -> FittedModel:
     Fitted anew until the torque hardly changes. The model as it is where it has no such columns, or where it does not
     settle, which its log says.
     """
-    if not any(model.solver.groups[group].candidate.follows_model for group in model.state.groups):
+    if not any(model.candidate(group).follows_model for group in model.state.groups):
         return model
     present, residual = model, model.residual(model.fit)
     for _ in range(tuning.max_follow_rounds):

@@ -47,7 +47,7 @@ class FittedModel:
 
     def candidate(self, group: int) -> Candidate:
         """The effect of a group of columns, at its place."""
-        return self.solver.groups[group].candidate
+        return self.solver.candidate(group)
 
     def coefficients(self, fit: Fit) -> Array:
         """Of the unscaled columns, (size,)."""
@@ -249,7 +249,7 @@ def torque_of(model: FittedModel) -> Callable[[Scene], Array]:
     nominal = design.simulation.inertial
     change = inertial if nominal is None else inertial - nominal
 
-    chosen = [(model.solver.groups[group].candidate, model.solver.values(fit, group)) for group in fit.state.groups]
+    chosen = [(model.candidate(group), model.solver.values(fit, group)) for group in fit.state.groups]
     effects = [FittedEffect(candidate, values) for candidate, values in chosen]
 
     def torque(scene: Scene) -> Array:

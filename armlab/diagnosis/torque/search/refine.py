@@ -48,7 +48,7 @@ def refine_shapes(
     """Blocks with better shapes for the state's groups that have any, by their number. but: groups that stay."""
     out = {}
     for group in (each for each in state.groups if each not in but):
-        candidate = solver.groups[group].candidate
+        candidate = solver.candidate(group)
         if candidate.shape:
             profile = profile_without(design, noise, solver, state.minus(group))
             found = _search_shape(design, noise, profile, design.blocks[group])

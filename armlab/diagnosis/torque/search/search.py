@@ -1,4 +1,4 @@
-"""The simpler laws that a law contains, and has to be better than."""
+"""The search for the set of effects with the best score, and its log."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from armlab.diagnosis.torque.columns.columns import Group
 from armlab.diagnosis.torque.columns.links import Widths
 from armlab.diagnosis.torque.columns.solver import Solver, State
 from armlab.diagnosis.tuning import SearchTuning
+from armlab.effects.contract import Candidate
 
 
 def rival_formulas(groups: Sequence[Group], number: int) -> tuple[int, ...]:
@@ -26,11 +27,40 @@ def rival_formulas(groups: Sequence[Group], number: int) -> tuple[int, ...]:
 
 
 @dataclass(frozen=True)
+class FailedTest:
+    """A test that a name did not pass, in words. value, bound: what was compared, None where it is no number."""
+
+    test: str
+    text: str
+    value: float | None = None
+    bound: float | None = None
+
+
+@dataclass(frozen=True)
 class Step:
-    """One move of the search, for the log."""
+    """One move of the search or one test of a name, for the log. failed: the test that made the move."""
 
     what: str
     score: float
+    failed: FailedTest | None = None
+
+    @classmethod
+    def against(cls, candidate: Candidate, failed: FailedTest, becomes: str = "withdrawn") -> "Step":
+        """That an effect failed a test, and what becomes of it."""
+        return cls(f"{becomes}: {candidate.effect} {candidate.joint}: {failed.text}", 0.0, failed)
+
+
+@dataclass(frozen=True)
+class NotTaken:
+    """An effect that a model does not hold, by its likeliest shape there. joint: from 1, None for the whole robot.
+
+    gain: what it would add to the score, nats. objection: of physics, None where there is none or nobody asked.
+    """
+
+    effect: str
+    joint: int | None
+    gain: float
+    objection: str | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +118,9 @@ class Search:
     def with_group(self, state: State, group: int) -> State:
         """The state with a group, without those that it replaces, or that break a law of physics at its joint then."""
         state = self.in_place(state, group)
-        joint = self.solver.groups[group].candidate.joint
+        joint = self.solver.candidate(group).joint
         for other in state.groups:
-            beside = other != group and self.solver.groups[other].candidate.joint == joint
+            beside = other != group and self.solver.candidate(other).joint == joint
             if beside and self.objection(state, other) is not None:
                 state = state.minus(other)
         return state
@@ -109,11 +139,11 @@ class Search:
 
         A law of the last resort is nowhere looked for beside the others: see `find_friction_curves`.
         """
-        return self.solver.groups[group].candidate.facts.last_resort or self.has_no_room(state, group)
+        return self.solver.candidate(group).facts.last_resort or self.has_no_room(state, group)
 
     def has_no_room(self, state: State, group: int) -> bool:
         """Whether the state holds the group's place already, or something that contains it."""
-        candidate = self.solver.groups[group].candidate
+        candidate = self.solver.candidate(group)
         inside = [self.solver.groups[other] for other in state.groups]
         return self._too_many_beside(state, group) or any(
             other.place == self.solver.groups[group].place
@@ -128,7 +158,7 @@ class Search:
 
     def _too_many_beside(self, state: State, group: int) -> bool:
         """Whether an effect would have more of another beside it than it allows, see `Effect.at_most_beside`."""
-        facts = [self.solver.groups[each].candidate.facts for each in (*state.groups, group)]
+        facts = [self.solver.candidate(each).facts for each in (*state.groups, group)]
         present = [each.id for each in facts]
         limits = [limit for each in facts for limit in each.at_most_beside.items()]
         return any(present.count(effect) > count for effect, count in limits)
@@ -153,6 +183,19 @@ class Search:
         solver, present = self.solver, list(state.groups)
         given_back = solver.prices[present] + solver.tuning.crowd_penalty * solver.unusual[present]
         return np.asarray(solver.gains(state) + solver.replaces[:, present] @ given_back)
+
+    def not_taken(self, state: State) -> Iterator[NotTaken]:
+        """Each effect at each place that a state does not hold, with what it would add to the score."""
+        gains, best = self.gains(state), dict[tuple[str, int | None], int]()
+        held = {(each.effect, each.joint) for each in map(self.solver.candidate, state.groups)}
+        for group in map(int, np.argsort(-gains)):
+            candidate = self.solver.candidate(group)
+            best.setdefault((candidate.effect, candidate.joint), group)
+        for (effect, joint), group in best.items():
+            if (effect, joint) not in held:
+                asked = gains[group] > self.tuning.min_score_step
+                objection = self.objection(self.with_group(state, group), group) if asked else None
+                yield NotTaken(effect, joint, float(gains[group]), objection)
 
     def objection(self, state: State, group: int) -> str | None:
         """What physics says against a group as it is fitted in a state."""
@@ -182,7 +225,7 @@ class Search:
         """The state without a group; with the usual friction that it contained; without the joint's friction at all."""
         bare, usual = state.minus(group), self.solver.contained(group)
         back = State(tuple(sorted({*bare.groups, *usual})), state.widths)
-        free, friction = bare, self._usual_friction(state, self.solver.groups[group].candidate.joint)
+        free, friction = bare, self._usual_friction(state, self.solver.candidate(group).joint)
         if friction[:1] == [
             group
         ]:  # one law may stand for all friction of a joint, and no part alone makes room for it
@@ -192,7 +235,7 @@ class Search:
 
     def _usual_friction(self, state: State, joint: int | None) -> list[int]:
         """Groups of a joint's usual friction in a state, in the order of the library."""
-        facts = [(group, self.solver.groups[group].candidate) for group in state.groups]
+        facts = [(group, self.solver.candidate(group)) for group in state.groups]
         return [group for group, each in facts if each.joint == joint and each.facts.usual and each.facts.dissipates]
 
     def _widths(self, state: State) -> Iterator[tuple[str, State]]:
@@ -210,7 +253,7 @@ class Search:
                 yield tuple(size if other == link else width for other, width in enumerate(widths))
 
     def _name(self, group: int) -> str:
-        candidate = self.solver.groups[group].candidate
+        candidate = self.solver.candidate(group)
         where = "" if candidate.joint is None else f" {candidate.joint}"
         shape = "" if not candidate.shape else f" {tuple(round(value, 4) for value in candidate.shape)}"
         return f"{candidate.effect}{where}{shape}"

@@ -1,0 +1,97 @@
+"""`steps.json`: how the names of a diagnosis were found and lost; and the answer to `--why EFFECT@JOINT`."""
+
+import json
+import re
+from collections.abc import Iterator
+from typing import Any, Final
+
+from armlab.common.errors import InputError
+from armlab.common.report.wording import format_number
+from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.torque.search.search import FailedTest, Step
+from armlab.diagnosis.tuning import SearchTuning
+from armlab.effects.library import effect_named
+from armlab.effects.words import at_place
+from armlab.report.words import effect_in_words
+from problem.arm import Arm
+
+STEPS_SCHEMA: Final = "steps/1"
+STEPS_FILE: Final = "steps.json"
+LEAST_GAIN = SearchTuning().min_score_step  # nats, that a search asks of an effect
+
+Place = tuple[str, int | None]
+
+
+def steps_texts(diagnosis: Diagnosis) -> dict[str, str]:
+    """The file: all moves and tests in their order, and what the model of the names does not hold; none without any."""
+    content = {
+        "schema": STEPS_SCHEMA,
+        "steps": [_step_entry(each) for each in diagnosis.steps],
+        "not_taken": [
+            {"effect": each.effect, "joint": each.joint, "gain": each.gain, "objection": each.objection}
+            for each in diagnosis.not_taken
+        ],
+    }
+    return {STEPS_FILE: json.dumps(content, indent=1) + "\n"} if diagnosis.steps else {}
+
+
+def _step_entry(step: Step) -> dict[str, Any]:
+    failed = step.failed
+    test = {} if failed is None else {"test": failed.test, "value": failed.value, "bound": failed.bound}
+    return {"what": step.what, "score": step.score, **test}
+
+
+def parse_place(text: str, arm: Arm) -> Place:
+    """An effect and its joint or link, from 1, of `EFFECT@JOINT`, or of `EFFECT` for one of the whole robot.
+
+    Raises InputError for an effect or a joint that there is not.
+    """
+    effect, _, joint = text.partition("@")
+    try:
+        effect_named(effect)
+    except ValueError as error:
+        raise InputError(f"--why {text}: {error}") from None
+    if not joint:
+        return effect, None
+    if not joint.isdecimal() or not 1 <= int(joint) <= len(arm):
+        raise InputError(f"--why {text}: a joint is one from 1 to {len(arm)}")
+    return effect, int(joint)
+
+
+def why_lines(diagnosis: Diagnosis, effect: str, joint: int | None) -> Iterator[str]:
+    """Why an effect is a finding, or why it is none: the tests that it passed or failed, in their order."""
+    name = at_place(diagnosis.simulation.arm, effect_in_words(effect), effect, joint)
+    mentioned = [each for each in diagnosis.steps if _mentions(each, effect, joint)]
+    yield f"why {name}: {_answer(diagnosis, mentioned, effect, joint)}"
+    yield from (f"  {each.what}" for each in mentioned)
+
+
+def _answer(diagnosis: Diagnosis, mentioned: list[Step], effect: str, joint: int | None) -> str:
+    for number, claim in enumerate(diagnosis.claims, 1):
+        if (claim.effect, claim.joint) == (effect, joint):
+            return f"it is finding {number} of {len(diagnosis.claims)}"
+    members = [claim for claim in diagnosis.claims if any(each.is_of(effect, joint) for each in claim.members)]
+    if members:
+        return f"it is one of the names of the finding {members[0].effect}: these data do not tell them apart"
+    failed = next((each.failed for each in reversed(mentioned) if each.failed is not None), None)
+    if failed is not None:
+        return f"not named: {_test_in_words(failed)}"
+    left = next((each for each in diagnosis.not_taken if (each.effect, each.joint) == (effect, joint)), None)
+    if left is None:
+        return "not named: no search looks for it there" if not mentioned else "in the model, without a claim"
+    if left.objection is not None:
+        return f"not named: {left.objection}"
+    if left.gain <= LEAST_GAIN:
+        return "not named: it would not raise the log evidence beside what is named"
+    return f"not named: it would raise the log evidence by {format_number(left.gain)}, and did not last in the search"
+
+
+def _test_in_words(failed: FailedTest) -> str:
+    if failed.value is None or failed.bound is None:
+        return failed.text
+    return f"{failed.test} is {format_number(failed.value)}, and needs {format_number(failed.bound)}"
+
+
+def _mentions(step: Step, effect: str, joint: int | None) -> bool:
+    where = "" if joint is None else f" {joint}"
+    return re.search(rf"\b{effect}{where}(?!\w)", step.what) is not None
