@@ -46,7 +46,7 @@ def calibrate_names(
     Uses development sets alone, and checks the probabilities on cases that are left out in turn, of real recordings all
     of one together (extra `calibrate`).
     """
-    from armlab.diagnosis.torque.names.choice import Example
+    from armlab.diagnosis.choice import Example
     from armlab.proof.blind.real.weighed import read_weighed_real
     from armlab.proof.blind.score.weighed import read_weighed
     from armlab.proof.blind.servo.score import read_weighed_motion

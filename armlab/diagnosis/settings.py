@@ -6,6 +6,7 @@ from typing import Literal
 
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
+from armlab.diagnosis.choice import Weights
 from armlab.diagnosis.tuning import Tuning, change_tuning
 
 Baseline = Literal["nominal", "refit", "simulated"]
@@ -47,14 +48,11 @@ def guards_without(names: Iterable[str]) -> Guards:
 
 @dataclass(frozen=True)
 class Settings:
-    """The guards, the tuning numbers of each stage, and what the weights of names may know.
-
-    left_out: a public recording from which the weights have learnt nothing, so that it can judge them; empty for none.
-    """
+    """The guards, the tuning numbers of each stage, and the weights of names: None for those learnt on all sets."""
 
     guards: Guards = Guards()
     tuning: Tuning = field(default_factory=Tuning)
-    left_out: str = ""
+    weights: Weights | None = None
 
 
 def vary(settings: Settings, name: str, value: object) -> Settings:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from armlab.common.arrays import Array
+from armlab.diagnosis.choice import Weights
 from armlab.diagnosis.settings import Settings, vary
 from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.design import DesignMatrix
@@ -21,7 +22,6 @@ from armlab.diagnosis.torque.names.additions import (
     add_probable,
     with_likeliest_names,
 )
-from armlab.diagnosis.torque.names.choice import Weights
 from armlab.diagnosis.torque.names.weighing import weigh_effect
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_background
 from armlab.diagnosis.torque.search.search import Search
@@ -57,7 +57,7 @@ def found_as(model: FittedModel, effect: str) -> Found:
 def test_what_is_added_has_the_likeliest_name(model: FittedModel, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever raised the score: here weights that ask for nothing but the name."""
     monkeypatch.setattr(
-        "armlab.diagnosis.torque.names.decide.calibrated_weights", lambda left_out: Weights({"is cable_stiffness": 9.0})
+        "armlab.diagnosis.torque.names.decide.calibrated_weights", lambda: Weights({"is cable_stiffness": 9.0})
     )
     spring_found = found_as(model, "cable_stiffness")
     for first in (found_as(model, "gravity_compensator"), spring_found):
@@ -67,9 +67,7 @@ def test_what_is_added_has_the_likeliest_name(model: FittedModel, monkeypatch: p
 
 
 def test_none_of_the_names_changes_nothing(model: FittedModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        "armlab.diagnosis.torque.names.decide.calibrated_weights", lambda left_out: Weights({"left none": 9.0})
-    )
+    monkeypatch.setattr("armlab.diagnosis.torque.names.decide.calibrated_weights", lambda: Weights({"left none": 9.0}))
     first = found_as(model, "gravity_compensator")
     assert _named(model, first, ())[0] is first
 
@@ -82,7 +80,7 @@ def holding(model: FittedModel, effect: str) -> FittedModel:
 @pytest.mark.parametrize("effect", ["gravity_compensator", "cable_stiffness"])
 def test_what_passed_takes_its_likeliest_name(model: FittedModel, monkeypatch: pytest.MonkeyPatch, effect: str) -> None:
     monkeypatch.setattr(
-        "armlab.diagnosis.torque.names.decide.calibrated_weights", lambda left_out: Weights({"is cable_stiffness": 9.0})
+        "armlab.diagnosis.torque.names.decide.calibrated_weights", lambda: Weights({"is cable_stiffness": 9.0})
     )
     held = holding(model, effect)
     belief = with_likeliest_names(Belief(held, Judge(held, held.state).effects()))
@@ -97,7 +95,7 @@ def test_what_passed_keeps_its_name_where_the_numbers_of_a_likelier_one_cannot_b
     model: FittedModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "armlab.diagnosis.torque.names.decide.calibrated_weights", lambda left_out: Weights({"is cable_stiffness": 9.0})
+        "armlab.diagnosis.torque.names.decide.calibrated_weights", lambda: Weights({"is cable_stiffness": 9.0})
     )
     monkeypatch.setattr(
         "armlab.diagnosis.torque.names.additions.doubtful_names",
@@ -115,7 +113,7 @@ def test_what_passed_keeps_its_name_where_none_is_likelier(model: FittedModel, m
     for weights in ({"is cable_stiffness": 8.5, "is gravity_compensator": 9.0}, {"found none": 9.0}):
         monkeypatch.setattr(
             "armlab.diagnosis.torque.names.decide.calibrated_weights",
-            lambda left_out, weights=weights: Weights(weights),
+            lambda weights=weights: Weights(weights),
         )
         belief = Belief(held, known)
         assert with_likeliest_names(belief) is belief
@@ -132,7 +130,7 @@ def test_what_is_added_in_the_place_of_an_effect_leaves_no_trace_of_it(
     evidence = Judge(held, held.state).effects()[old]
     found = found_as(model, "cable_stiffness")
     weights = Weights({"is cable_stiffness": 9.0})
-    monkeypatch.setattr("armlab.diagnosis.torque.names.decide.calibrated_weights", lambda left_out: weights)
+    monkeypatch.setattr("armlab.diagnosis.torque.names.decide.calibrated_weights", lambda: weights)
     names = weigh_effect(replace(model, state=found[1]), found[0], {found[0]: found[2]}, ())
     monkeypatch.setattr("armlab.diagnosis.torque.names.additions.doubtful_names", lambda *_, **exact: {})
     monkeypatch.setattr("armlab.diagnosis.torque.names.additions._named", lambda *_: (found, names))

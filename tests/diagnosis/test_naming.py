@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from armlab.common.errors import InputError
+from armlab.diagnosis.choice import Example, Weights, fit_lapse, fit_weights, probabilities, with_lapse
 from armlab.diagnosis.result import Claim, Rival, Weighed, WeighedName
 from armlab.diagnosis.settings import Settings, vary
 from armlab.diagnosis.torque.evidence.evidence import Evidence
-from armlab.diagnosis.torque.names.choice import Example, Weights, fit_lapse, fit_weights, probabilities, with_lapse
 from armlab.diagnosis.torque.names.decide import calibrated_weights, named_claims, naming_of, unknown_limit
 from armlab.diagnosis.torque.names.findings import Statement, statement_of
 from armlab.effects.drive import TorqueOffset
@@ -20,9 +20,7 @@ from armlab.proof.open.calibration.calibrate import Finding, calibrate, judge_re
 @pytest.fixture(autouse=True)
 def plain_weights(monkeypatch: pytest.MonkeyPatch) -> None:
     """One number, whose weight is one."""
-    monkeypatch.setattr(
-        "armlab.diagnosis.torque.names.decide.calibrated_weights", lambda left_out: Weights({"for it": 1.0})
-    )
+    monkeypatch.setattr("armlab.diagnosis.torque.names.decide.calibrated_weights", lambda: Weights({"for it": 1.0}))
 
 
 def weighed(unknown: float, **names: float) -> Weighed:

@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 
+from armlab.diagnosis.choice import Weights, probabilities
 from armlab.diagnosis.result import Claim, Member, Weighed, WeighedName
 from armlab.diagnosis.settings import Settings
-from armlab.diagnosis.torque.names.choice import Weights, probabilities
 from armlab.diagnosis.torque.names.claims import next_experiment
 from armlab.diagnosis.tuning import NamingTuning
 from armlab.effects.contract import UNKNOWN
@@ -77,7 +77,7 @@ class Naming:
 
 def with_probabilities(weighed: Weighed, settings: Settings) -> list[tuple[WeighedName, float]]:
     """Each name of a finding, and none of them, with its probability."""
-    chances = probabilities([each.numbers for each in weighed], calibrated_weights(settings.left_out))
+    chances = probabilities([each.numbers for each in weighed], settings.weights or calibrated_weights())
     return [(each, float(chance)) for each, chance in zip(weighed, chances, strict=True)]
 
 

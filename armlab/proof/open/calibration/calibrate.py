@@ -15,7 +15,7 @@ from sklearn.metrics import brier_score_loss, log_loss
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.statistics import wilson_interval
-from armlab.diagnosis.torque.names.choice import Example, Weights, fit_lapse, fit_weights, probabilities, with_lapse
+from armlab.diagnosis.choice import Example, Weights, fit_lapse, fit_weights, probabilities, with_lapse
 
 FOLDS = 5
 BINS = (0.0, 0.5, 0.7, 0.9, 1.0)

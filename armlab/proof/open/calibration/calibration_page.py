@@ -6,7 +6,7 @@ from pathlib import Path
 
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
-from armlab.diagnosis.torque.names.choice import Weights
+from armlab.diagnosis.choice import Weights
 from armlab.diagnosis.torque.names.decide import CALIBRATION_FILE
 from armlab.proof.open.calibration.calibrate import Calibration, Reliability
 

@@ -12,6 +12,7 @@ import numpy as np
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.torque.diagnose import diagnose
+from armlab.diagnosis.torque.names.decide import calibrated_weights
 from armlab.diagnosis.torque.predict.found_model import model_found, named_model
 from armlab.effects.drive import RotorInertia
 from armlab.identification.structure import Structure
@@ -108,7 +109,7 @@ def study_arm(recipe: Recipe, recording: Recording, looks: Looks, progress: Prog
         diagnoses[baseline] = diagnose(
             recording,
             baseline,
-            settings=Settings(left_out=recipe.name),
+            settings=Settings(weights=calibrated_weights(recipe.name)),
             progress=progress_under(f"{recipe.name}, {baseline}", progress),
         )
     lines = tuple(_lines(recipe, identified, diagnoses, judged, cutoff, looks))
@@ -202,5 +203,5 @@ def _alone_studies(
 def _diagnose_alone(recipe: Recipe, recording: Recording, run: Run, progress: Progress) -> Diagnosis:
     heading = f"{recipe.name}, nominal, {run.name} alone"
     alone = replace(recording, runs=(replace(run, role="identify"),))
-    settings = Settings(left_out=recipe.name)
+    settings = Settings(weights=calibrated_weights(recipe.name))
     return diagnose(alone, "nominal", settings=settings, progress=progress_under(heading, progress))

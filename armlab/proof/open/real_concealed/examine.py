@@ -18,6 +18,7 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.result import Claim, Diagnosis, Weighed
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.diagnose import diagnose
+from armlab.diagnosis.torque.names.decide import calibrated_weights
 from armlab.diagnosis.torque.rows.data import Observed, rows_in
 from armlab.identification.model_file import write_model
 from armlab.identification.torque_model import TorqueModel
@@ -190,7 +191,7 @@ def diagnose_concealed(seen: Recording, source: str, progress: Callable[[str], N
 
     source: name of the public recording, about which the weights of names know nothing.
     """
-    diagnosis = diagnose(seen, "nominal", settings=Settings(left_out=source), progress=progress)
+    diagnosis = diagnose(seen, "nominal", settings=Settings(weights=calibrated_weights(source)), progress=progress)
     findings = tuple(summarise_mistake(each) for each in (diagnosis.setup.findings if diagnosis.setup else ()))
     findings += tuple(summarise_claim(each) for each in diagnosis.claims)
     refused = diagnosis.observed is None or diagnosis.final is None
