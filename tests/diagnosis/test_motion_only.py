@@ -20,21 +20,15 @@ from armlab.diagnosis.motion.calm_windows import confirm_in_calm_windows, find_c
 from armlab.diagnosis.motion.choose import ChosenServo, Gain, choose_servo, learned_errors
 from armlab.diagnosis.motion.compare import compare_motion
 from armlab.diagnosis.motion.couple import coupled_windows
-from armlab.diagnosis.motion.diagnose import (
-    JointTrials,
-    MotionDiagnosis,
-    ServoFinding,
-    diagnose_motion,
-    replay_named,
-    replays_as_well,
-    split_runs,
-)
+from armlab.diagnosis.motion.diagnose import diagnose_motion, split_runs
 from armlab.diagnosis.motion.encoder_steps import is_made_by_encoder_steps
 from armlab.diagnosis.motion.estimate import ServoFit, fit_servo
 from armlab.diagnosis.motion.export import mjcf_text
+from armlab.diagnosis.motion.held_out import JointTrials, replay_named, replays_as_well
 from armlab.diagnosis.motion.hold import hold_commands
 from armlab.diagnosis.motion.joint_replay import joint_errors, replay_joint
 from armlab.diagnosis.motion.replay import joint_rms, replay
+from armlab.diagnosis.motion.result import MotionDiagnosis, ServoFinding
 from armlab.diagnosis.motion.separate import confused_parameters
 from armlab.diagnosis.motion.servo import NEUTRAL, PARAMETERS, USUAL, Key, Servos, place
 from armlab.diagnosis.motion.shared_number import COMMON_DELAY, TOOL_MASS, JointModel, estimate_shared, weigh

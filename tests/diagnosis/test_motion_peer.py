@@ -11,8 +11,9 @@ from servo_arms import write_recording
 
 from armlab.cli.main import main
 from armlab.common.errors import InputError
-from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion
+from armlab.diagnosis.motion.diagnose import diagnose_motion
 from armlab.diagnosis.motion.replay import joint_rms
+from armlab.diagnosis.motion.result import MotionDiagnosis
 from armlab.diagnosis.motion.servo import place
 from armlab.diagnosis.motion.tuning import DEFAULT
 from armlab.proof.open.motion.peer import WINDOWS, PeerComparison, compare_with_sysid, import_sysid, servo_task

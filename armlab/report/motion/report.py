@@ -6,8 +6,8 @@ from markupsafe import Markup
 from armlab.common.report.charts import FOUND_LOOK, GIVEN_LOOK, MEASURED_LOOK, Layer, Line, draw_chart, fit_axis
 from armlab.common.report.page import Table, render_page
 from armlab.common.report.wording import format_unit
-from armlab.diagnosis.motion.diagnose import MotionDiagnosis
 from armlab.diagnosis.motion.export import lines_without_field
+from armlab.diagnosis.motion.result import MotionDiagnosis
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
 from armlab.effects.library import effect_named
 from armlab.report.motion.told import told_numbers

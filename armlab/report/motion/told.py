@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from armlab.diagnosis.motion.diagnose import MotionDiagnosis, ServoFinding
 from armlab.diagnosis.motion.naming import servo_naming
+from armlab.diagnosis.motion.result import MotionDiagnosis, ServoFinding
 from armlab.diagnosis.result import MAX_MINOR_GROWTH
 from armlab.diagnosis.torque.names.decide import Naming
 from armlab.diagnosis.torque.names.findings import MAX_TOLD_CAUSES, MAX_TOLD_OF_JOINT, Statement, ToldCause, state_name

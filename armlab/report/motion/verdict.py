@@ -26,9 +26,9 @@ from armlab.diagnosis.formats import (
     kind_of_effect,
 )
 from armlab.diagnosis.motion import servo_plugin
-from armlab.diagnosis.motion.diagnose import JointError, MotionDiagnosis
 from armlab.diagnosis.motion.export import lines_without_field, mjcf_text, servos_json
 from armlab.diagnosis.motion.naming import weigh_servo
+from armlab.diagnosis.motion.result import JointError, MotionDiagnosis
 from armlab.diagnosis.motion.robot_learning import isaac_lab_text, mjlab_text
 from armlab.diagnosis.motion.ros2_control import controllers_text, ros_urdf_text
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from textwrap import wrap
 
 from armlab.common.report.wording import count_of, format_unit, join_words
-from armlab.diagnosis.motion.diagnose import JointError, MotionDiagnosis, ServoFinding
+from armlab.diagnosis.motion.result import JointError, MotionDiagnosis, ServoFinding
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT
 from armlab.diagnosis.motion.witness import CurrentWitness
 from armlab.diagnosis.torque.names.findings import FRICTION

@@ -10,8 +10,9 @@ from armlab.common.arrays import Array
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.diagnosis.motion.compare import MotionComparison, compare_motion
-from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion
+from armlab.diagnosis.motion.diagnose import diagnose_motion
 from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay, tool_rms
+from armlab.diagnosis.motion.result import MotionDiagnosis
 from armlab.diagnosis.motion.servo import KEYS, PARAMETERS, Servos, place
 from armlab.proof.open.motion.peer import NO_FIELD, PeerComparison, compare_with_sysid, import_sysid
 from armlab.recordings.motion import MotionRecording, load_motion_recording
