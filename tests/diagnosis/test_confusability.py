@@ -15,7 +15,7 @@ from told_recordings import ARM, frame, motion_at, recording_in
 from armlab.cli.main import main
 from armlab.diagnosis.next.confusability.card import (
     Card,
-    Entry,
+    CardEntry,
     PlannedMotion,
     confusability_card,
     read_planned_motions,
@@ -36,11 +36,11 @@ def card() -> Card:
     return confusability_card(ARM, (planned(),), library())
 
 
-def entry(card: Card, effect: str, joint: int | None = None, form: str = "") -> Entry:
+def entry(card: Card, effect: str, joint: int | None = None, form: str = "") -> CardEntry:
     return next(each for each in card.entries if (each.effect, each.joint) == (effect, joint) and form in each.form)
 
 
-def rivals(card: Card, one: Entry, view: str) -> set[tuple[str, int | None]]:
+def rivals(card: Card, one: CardEntry, view: str) -> set[tuple[str, int | None]]:
     return {(card.entries[each.index].effect, card.entries[each.index].joint) for each in one.rivals[view]}
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from armlab.diagnosis.motion.choose import (
     ChosenServo,
-    Gain,
+    GainOfNumber,
     chance_of_gain,
     chance_of_match,
     first_guesses,
@@ -17,7 +17,7 @@ from armlab.diagnosis.motion.joint_replay import replay_joint
 from armlab.diagnosis.motion.servo import HIGHEST, KEYS, LOWEST, NEUTRAL, USUAL, Key, place
 from armlab.diagnosis.motion.windows import Windows, phase_of_steps, smallest_step
 
-GAIN = Gain(share=0.5, enough=0.02, p_value=1e-6, rms_without=2e-3, rms_with=1e-3)
+GAIN = GainOfNumber(share=0.5, enough=0.02, p_value=1e-6, rms_without=2e-3, rms_with=1e-3)
 
 
 def numbers(**values: float) -> np.ndarray:

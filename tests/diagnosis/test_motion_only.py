@@ -17,7 +17,7 @@ from armlab.common.files import write_texts
 from armlab.diagnosis.formats import read_verdict_file
 from armlab.diagnosis.motion.arm_fit import ArmFit, fine_enough, fit_arm
 from armlab.diagnosis.motion.calm_windows import confirm_in_calm_windows, find_calm_windows
-from armlab.diagnosis.motion.choose import ChosenServo, Gain, choose_servo, learned_errors
+from armlab.diagnosis.motion.choose import ChosenServo, GainOfNumber, choose_servo, learned_errors
 from armlab.diagnosis.motion.compare import compare_motion
 from armlab.diagnosis.motion.couple import coupled_windows
 from armlab.diagnosis.motion.diagnose import diagnose_motion, split_runs
@@ -387,7 +387,7 @@ def test_windows_where_no_limit_acts_refute_a_gain_that_a_limit_makes(soft: Path
     windows = moved_windows(soft, true)
     free = np.array(USUAL)
     spoilt[place("kp")] = 7.5
-    odd, gain = np.zeros(0, dtype=np.intp), Gain(0.5, 0.02, 1e-9, 2e-3, 1e-3)
+    odd, gain = np.zeros(0, dtype=np.intp), GainOfNumber(0.5, 0.02, 1e-9, 2e-3, 1e-3)
     wrong = ChosenServo(nominal, fit_servo(windows, spoilt, free), free, {place("kp"): gain}, odd, cost=0.0)
     confirmed = confirm_in_calm_windows(windows, wrong, 20)
     assert 0 < len(find_calm_windows(windows, nominal[None])) < windows.count
@@ -412,7 +412,7 @@ def test_a_finding_alone_keeps_its_kd_and_its_stribeck_speed(soft: Path) -> None
     free[[place("damping"), place("static_excess")]] = True
     outside = true.copy()
     outside[[place("kd"), place("damping")]] = 0.4, 0.3
-    gains = dict.fromkeys(np.flatnonzero(free).tolist(), Gain(0.5, 0.02, 1e-9, 2e-3, 1e-3))
+    gains = dict.fromkeys(np.flatnonzero(free).tolist(), GainOfNumber(0.5, 0.02, 1e-9, 2e-3, 1e-3))
     inside = ChosenServo(nominal, fit_servo(windows, outside, free), free, gains, odd, cost=0.0).with_damping_inside()
     assert inside is not None
     damped = inside.with_one_finding(place("damping"), windows).fit.values

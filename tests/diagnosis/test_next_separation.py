@@ -19,7 +19,7 @@ from armlab.diagnosis.next.decision import (
 from armlab.diagnosis.next.moments import solve_least_squares, unexplained_power
 from armlab.diagnosis.next.motion import fourier_within_limits
 from armlab.diagnosis.next.problem import RivalSettings, TellApartProblem, TellApartSettings
-from armlab.diagnosis.next.question import Law, Name, Question, Rival
+from armlab.diagnosis.next.question import Law, Name, Question, RivalLaw
 from armlab.diagnosis.next.remedies import find_remedies
 from armlab.diagnosis.next.sampling import kept_columns, white_noise_sampling
 from armlab.diagnosis.tuning import Tuning
@@ -90,7 +90,7 @@ def pair_question(*weights: float) -> Question:
     laws = [Law(viscous, np.array([number]), 1, 1, 1.0) for number in range(len(weights))]
     names = [Name("viscous_friction", number + 1) for number in range(len(weights))]
     rivals = tuple(
-        Rival(name, (law,), np.ones(1), weight) for name, law, weight in zip(names, laws, weights, strict=True)
+        RivalLaw(name, (law,), np.ones(1), weight) for name, law, weight in zip(names, laws, weights, strict=True)
     )
     none = np.empty(0, dtype=np.intp)
     return Question(rivals, none, none, np.zeros((len(weights),) * 2, dtype=bool))

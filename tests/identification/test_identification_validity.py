@@ -26,7 +26,7 @@ from armlab.identification.selection import (
     toggle_group,
 )
 from armlab.identification.structure import Structure
-from armlab.proof.open.coverage import Noise, three_joint_experiment
+from armlab.proof.open.coverage import SimulatedNoise, three_joint_experiment
 from armlab.proof.open.real_identification.looks import Looks
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.recording import Run
@@ -36,7 +36,7 @@ from problem.robot_file import load_arm
 
 
 def test_intervals_hold_the_truth_in_about_95_percent_of_experiments() -> None:
-    experiment = three_joint_experiment(Noise())
+    experiment = three_joint_experiment(SimulatedNoise())
     held = np.array([experiment.check_intervals(seed)[0] for seed in range(20)])
     assert 0.90 < held.mean() < 0.99
 

@@ -11,7 +11,7 @@ from hidden_cases import MACHINE, case, residual
 from armlab.common.arrays import Array
 from armlab.effects.library import BUILT_IN
 from armlab.proof.blind.effects.bodies import Geometry, LinkError, Payload, Tilt
-from armlab.proof.blind.effects.channels import Contact, Delay, EncoderOffset, Gain, Offset, Saturation, Skew
+from armlab.proof.blind.effects.channels import Contact, Delay, EncoderOffset, Offset, Saturation, Skew, TorqueGain
 from armlab.proof.blind.effects.drives import Backlash, Coupling, Elasticity, Rotor
 from armlab.proof.blind.effects.friction import (
     Asymmetric,
@@ -59,7 +59,7 @@ MARKS: dict[type[HiddenEffect], tuple[Column, float]] = {  # a column, and the l
     Presliding: (_sign, 0.5),
     Drift: (_velocity, 0.9),
     Rotor: (lambda m, t, e: m.acceleration[:, J], 0.99),
-    Gain: (lambda m, t, e: e.shape["direction"] * t[:, J], 0.9),
+    TorqueGain: (lambda m, t, e: e.shape["direction"] * t[:, J], 0.9),
     Offset: (lambda m, t, e: e.shape["direction"] * np.ones(len(t)), 0.9),
     Ripple: (lambda m, t, e: np.sin(e.shape["order"] * m.position[:, J] + e.shape["phase"]), 0.5),
     Coupling: (lambda m, t, e: m.velocity[:, 2], 0.8),
@@ -206,7 +206,7 @@ def test_a_saturated_channel_takes_its_share_from_the_highest_torque(form: str, 
 
 @pytest.mark.parametrize("knee", [-0.2, 0.0, 0.2])
 def test_a_bent_gain_reads_zero_as_zero_and_is_bent_at_its_knee(knee: float) -> None:
-    channel = Gain(0, 0.1, 0.5, "bent", {"direction": 1.0, "knee": knee, "peak": 20.0})
+    channel = TorqueGain(0, 0.1, 0.5, "bent", {"direction": 1.0, "knee": knee, "peak": 20.0})
     torque = np.linspace(-20, 20, 401)[:, None]
     slope = np.diff(channel.read(torque)[:, 0]) / 0.1
     assert channel.read(np.zeros((1, 1)))[0, 0] == 0.0

@@ -8,8 +8,8 @@ from made_answers import effect, truth
 
 from armlab.proof.blind.loop.case import TrueNames, find_suspects, judge_end, judge_start, true_names
 from armlab.proof.blind.loop.counts import (
+    LoopShare,
     MotionComparison,
-    Share,
     brier_scores,
     compare_motions,
     count_shares,
@@ -113,13 +113,13 @@ def test_cases_that_ran_away_or_never_were_ambiguous_are_left_out_whole() -> Non
 
 
 def test_shares_count_by_kind_of_motion_and_by_beginning() -> None:
-    assert count_shares(make_table(FOUND))["designed", "right"] == Share(2, 2)
-    assert count_shares(make_table(FOUND), "told")["random", "open"] == Share(1, 1)
+    assert count_shares(make_table(FOUND))["designed", "right"] == LoopShare(2, 2)
+    assert count_shares(make_table(FOUND), "told")["random", "open"] == LoopShare(1, 1)
 
 
 def test_a_share_is_told_with_wilsons_interval() -> None:
-    assert str(Share(5, 10)) == "50 % (24-76)"
-    assert str(Share(0, 0)) == "-"
+    assert str(LoopShare(5, 10)) == "50 % (24-76)"
+    assert str(LoopShare(0, 0)) == "-"
 
 
 def test_a_motion_is_compared_case_by_case() -> None:
@@ -132,8 +132,8 @@ def test_a_motion_is_compared_case_by_case() -> None:
 def test_forecasts_are_held_against_what_came() -> None:
     table = make_table(FOUND)
     low, high = reliability_bins(table)
-    assert (low.expected, low.observed) == (pytest.approx(0.3), Share(1, 2))
-    assert (high.expected, high.observed) == (pytest.approx(0.9), Share(2, 2))
+    assert (low.expected, low.observed) == (pytest.approx(0.3), LoopShare(1, 2))
+    assert (high.expected, high.observed) == (pytest.approx(0.9), LoopShare(2, 2))
     assert mean_chances(table)["right"] == (pytest.approx(0.6), 0.75)
     assert brier_scores(table)[0] == pytest.approx((0.01 + 0.01 + 0.09 + 0.49) / 4)
 

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from armlab.cli.main import main
 from armlab.common.errors import InputError
 from armlab.proof.blind import naming_oracle
-from armlab.proof.blind.effects.channels import Gain, Skew
+from armlab.proof.blind.effects.channels import Skew, TorqueGain
 from armlab.proof.blind.effects.friction import Coulomb, EarlyFriction, Viscous
 from armlab.proof.blind.effects.hidden import HiddenEffect
 from armlab.proof.blind.naming_oracle import OracleAnswer, ask_oracle
@@ -68,7 +68,7 @@ def test_a_rival_that_cannot_be_simulated_coarsely_is_drawn_again(monkeypatch: p
 
 
 def test_a_gain_of_a_horizontal_arm_is_mistaken_for_what_scales_its_torque() -> None:
-    found = answer_to(Gain(1, 0.02, 1.0, "factor", {"direction": 1.0, "knee": 0.0, "peak": 0.0}))
+    found = answer_to(TorqueGain(1, 0.02, 1.0, "factor", {"direction": 1.0, "knee": 0.0, "peak": 0.0}))
     size = found.multiple * np.sqrt(limit_noncentrality(2))  # of the effect itself, in standard deviations
     assert found.distance < 0.8 * size  # a body at the same link explains a third of its power, or more
     assert found.rival in ("payload", "inertial_parameter_error", "rotor_inertia")

@@ -24,7 +24,7 @@ from armlab.proof.open.real_arms.judged_run import Percent, common_cutoff, judge
 from armlab.proof.open.real_arms.leave_one_out import (
     USUAL,
     Change,
-    Outcome,
+    ChosenOutcome,
     choose_change,
     inside_identification,
     joined_change,
@@ -224,9 +224,9 @@ def test_masses_agree_where_their_intervals_allow_one_mass() -> None:
 # --- leave one out
 
 
-def outcome(error: float) -> Outcome:
+def outcome(error: float) -> ChosenOutcome:
     """An outcome with one run."""
-    return Outcome({"a": Percent(error, error)})
+    return ChosenOutcome({"a": Percent(error, error)})
 
 
 TRIED = {"search.rounds": (1, 3), "solver.crowd_penalty": (2.0,)}
@@ -242,7 +242,7 @@ def test_the_change_with_the_least_logarithm_over_arms_is_chosen_and_equals_stay
     }
     assert choose_change(outcomes) == more
     assert choose_change({usual: [outcome(1)], less: [outcome(1)]}) == USUAL
-    assert choose_change({usual: [outcome(1)], less: [Outcome(None)]}) == USUAL
+    assert choose_change({usual: [outcome(1)], less: [ChosenOutcome(None)]}) == USUAL
     assert joined_change(outcomes) == (("search.rounds", 3),)
 
 
@@ -267,11 +267,11 @@ def test_leave_one_out_judges_each_arm_logs_its_looks_and_continues_where_it_was
     done: list[Change] = []
     stop_after = 3
 
-    def counted(recording: Recording, change: Change, progress: Progress) -> Outcome:
+    def counted(recording: Recording, change: Change, progress: Progress) -> ChosenOutcome:
         if len(done) == stop_after:
             raise KeyboardInterrupt
         done.append(change)
-        return Outcome({run.name: Percent(9, 8 - len(change)) for run in recording.with_role("validate")})
+        return ChosenOutcome({run.name: Percent(9, 8 - len(change)) for run in recording.with_role("validate")})
 
     monkeypatch.setattr(leave_one_out, "examine", counted)
     with pytest.raises(KeyboardInterrupt):

@@ -7,7 +7,13 @@ from armlab.proof.open.real_concealed.at_random import RandomStudy, random_table
 from armlab.proof.open.real_concealed.claims import DrawnVerdict, judge_drawn
 from armlab.proof.open.real_concealed.conceal import SoughtEffect
 from armlab.proof.open.real_concealed.draw import DrawnCase
-from armlab.proof.open.real_concealed.examine import Outcome, ParameterSize, PossibleName, ReportedFinding, Rival
+from armlab.proof.open.real_concealed.examine import (
+    ExaminedCase,
+    ParameterSize,
+    PossibleName,
+    ReportedFinding,
+    RivalName,
+)
 from armlab.proof.open.real_concealed.labels import LabelledFinding, label_weighed
 from armlab.proof.open.real_concealed.plan import Case, Disturbance
 
@@ -18,7 +24,7 @@ CASE = DrawnCase(Case("told", (), Disturbance("cable_stiffness", 2, 2.0, "N m/ra
 def _said(
     effect: str, *joints: int, chance: float | None = 0.9, members: tuple[PossibleName, ...] = ()
 ) -> ReportedFinding:
-    rivals = tuple(Rival(each.effect, each.joints) for each in members if each.effect not in (effect, "unknown"))
+    rivals = tuple(RivalName(each.effect, each.joints) for each in members if each.effect not in (effect, "unknown"))
     return ReportedFinding(effect, joints, "", (), rivals, chance, members)
 
 
@@ -29,8 +35,8 @@ def _sized(effect: str, size: float, *joints: int) -> ReportedFinding:
 def _judged(
     *said: ReportedFinding, sought: SoughtEffect = SPRING, control: tuple[ReportedFinding, ...] = (), joints: int = 3
 ) -> DrawnVerdict:
-    def outcome(findings: tuple[ReportedFinding, ...]) -> Outcome:
-        return Outcome("told", findings, (1.0,), (1.0,), (1.0,), (1.0,), None, 0.1)
+    def outcome(findings: tuple[ReportedFinding, ...]) -> ExaminedCase:
+        return ExaminedCase("told", findings, (1.0,), (1.0,), (1.0,), (1.0,), None, 0.1)
 
     return judge_drawn(CASE, outcome(said), (sought,), outcome(control), joints)
 
@@ -40,7 +46,7 @@ def _weighed(*names: str) -> Weighed:
 
 
 def _labels(*weighed: Weighed, control: tuple[ReportedFinding, ...] = ()) -> list[LabelledFinding]:
-    outcome = Outcome("told", (), (1.0,), (1.0,), (1.0,), (1.0,), None, 0.1, weighed=weighed)
+    outcome = ExaminedCase("told", (), (1.0,), (1.0,), (1.0,), (1.0,), None, 0.1, weighed=weighed)
     return list(label_weighed(outcome, (SPRING,), replace(outcome, findings=control), 3))
 
 

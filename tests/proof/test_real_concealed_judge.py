@@ -1,7 +1,7 @@
 """The judge of concealed cases, on findings that are made up."""
 
 from armlab.proof.open.real_concealed.conceal import SoughtEffect
-from armlab.proof.open.real_concealed.examine import Outcome, ParameterSize, ReportedFinding, Rival
+from armlab.proof.open.real_concealed.examine import ExaminedCase, ParameterSize, ReportedFinding, RivalName
 from armlab.proof.open.real_concealed.judge import Answer, CaseVerdict, judge_case
 from armlab.proof.open.real_concealed.plan import Case, Disturbance
 
@@ -16,15 +16,15 @@ CASE = Case("told", (), Disturbance("payload", 3, 2.0, "kg"))
 
 
 def _said(
-    effect: str, *joints: int, size: float = 1.0, rivals: tuple[Rival, ...] = (), name: str = "mass"
+    effect: str, *joints: int, size: float = 1.0, rivals: tuple[RivalName, ...] = (), name: str = "mass"
 ) -> ReportedFinding:
     return ReportedFinding(effect, joints, "", (ParameterSize(name, size, (size - 0.2, size + 0.2), "kg"),), rivals)
 
 
-def _outcome(*said: ReportedFinding, joints: int = 3, given: float = 3.0, found: float = 1.0) -> Outcome:
+def _outcome(*said: ReportedFinding, joints: int = 3, given: float = 3.0, found: float = 1.0) -> ExaminedCase:
     every = (given,) * joints
     hidden = (0.5, 4.0, 0.5)[:joints]
-    return Outcome("told", said, every, (found,) * joints, hidden, (9.0,) * joints, 1.0, 0.1)
+    return ExaminedCase("told", said, every, (found,) * joints, hidden, (9.0,) * joints, 1.0, 0.1)
 
 
 def _verdict(
@@ -39,7 +39,7 @@ def _answer(*said: ReportedFinding) -> Answer:
 
 
 def test_each_answer_has_its_word() -> None:
-    class_of_two = (Rival("payload", (3,)),)
+    class_of_two = (RivalName("payload", (3,)),)
     assert _answer(_said("payload", 3)) == "named"
     assert _answer(_said("inertial_parameter_error", 3)) == "identical"
     assert _answer(_said("rotor_inertia", 3, rivals=class_of_two)) == "class"

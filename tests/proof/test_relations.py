@@ -7,7 +7,7 @@ import pytest
 from told_recordings import frame, recording_in
 
 from armlab.proof.open.relations.bench import bench_relations, relations_page
-from armlab.proof.open.relations.relations import NULL_PAIRS, QUICK, RELATIONS, Desk, Outcome, check_relation
+from armlab.proof.open.relations.relations import NULL_PAIRS, QUICK, RELATIONS, Desk, RelationOutcome, check_relation
 from armlab.proof.open.relations.variants import every_other_second, half, one_run, resampled, rewritten, thinned
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
@@ -56,7 +56,9 @@ def test_halves_and_single_runs_share_no_row(recording: Recording) -> None:
 
 
 def test_a_broken_relation_stands_in_the_table() -> None:
-    page = relations_page([Outcome("arm", "X against X", False, "payload@3"), Outcome("leg", "X against X", None, "-")])
+    page = relations_page(
+        [RelationOutcome("arm", "X against X", False, "payload@3"), RelationOutcome("leg", "X against X", None, "-")]
+    )
     assert "| X against X | **broken** | no answer |" in page
     assert "payload@3" in page
 
@@ -65,9 +67,9 @@ def test_outcomes_are_kept_for_the_next_run(tmp_path: Path, monkeypatch: pytest.
     folder = recording_in(tmp_path / "arm", frame(0, 6), frame(1, 6))
     asked: list[str] = []
 
-    def answer(name: str, recording: Recording, desk: Desk) -> Outcome:
+    def answer(name: str, recording: Recording, desk: Desk) -> RelationOutcome:
         asked.append(name)
-        return Outcome(recording.name, name, True, "")
+        return RelationOutcome(recording.name, name, True, "")
 
     monkeypatch.setattr("armlab.proof.open.relations.bench.check_relation", answer)
     for _ in range(2):
@@ -80,8 +82,8 @@ def test_null_pairs_are_counted_on_a_page_of_their_own(tmp_path: Path, monkeypat
     folder = recording_in(tmp_path / "arm", frame(0, 6), frame(1, 6))
     answers = dict(zip(NULL_PAIRS, (True, False, None), strict=True))
 
-    def answer(name: str, recording: Recording, desk: Desk) -> Outcome:
-        return Outcome(recording.name, name, answers[name], "")
+    def answer(name: str, recording: Recording, desk: Desk) -> RelationOutcome:
+        return RelationOutcome(recording.name, name, answers[name], "")
 
     monkeypatch.setattr("armlab.proof.open.relations.bench.check_relation", answer)
     lines = list(bench_relations(tmp_path / "results", tmp_path / "none", [folder], ["arm"], NULL_PAIRS))

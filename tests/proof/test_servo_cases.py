@@ -10,7 +10,7 @@ from armlab.diagnosis.motion.diagnose import diagnose_motion
 from armlab.proof.blind import sealed
 from armlab.proof.blind.servo.hidden import KINDS, Hidden
 from armlab.proof.blind.servo.make import MadeCase, make_case, write_case
-from armlab.proof.blind.servo.oracle import Oracle, find_size
+from armlab.proof.blind.servo.oracle import ServoOracle, find_size
 from armlab.proof.blind.servo.plan import MOTIONS, ServoCase, draw_cases
 from armlab.proof.blind.servo.score import judge
 from armlab.proof.blind.servo.truth import TRUTH_SCHEMA_FILE, truth_schema
@@ -46,7 +46,7 @@ def test_held_out_motions_are_two_or_three_and_two_or_more_are_left():
 @pytest.mark.parametrize("kind", ["friction", "gain", "offset"])
 def test_a_hidden_size_is_of_about_the_wanted_detection_limits(kind):
     case = small_case("one")
-    oracle = Oracle(case, case.drawn[0])
+    oracle = ServoOracle(case, case.drawn[0])
     sized, multiple = find_size(oracle, Hidden(kind, 1), 6.0)
     assert multiple == pytest.approx(6.0, rel=0.25)
     assert 0 < sized.size < KINDS[kind].largest
@@ -55,7 +55,7 @@ def test_a_hidden_size_is_of_about_the_wanted_detection_limits(kind):
 def test_an_arm_without_a_difference_has_no_detection_limit_of_one():
     case = small_case("one")
     arm = case.drawn[0]
-    assert Oracle(case, arm).multiple(Hidden("offset", 0), arm, arm) == pytest.approx(0.0, abs=1e-9)
+    assert ServoOracle(case, arm).multiple(Hidden("offset", 0), arm, arm) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_hidden_delay_is_one_that_the_engine_takes():

@@ -175,7 +175,7 @@ def common_values(table: ChangeTable, found: Sequence[Tested]) -> Array:
 
 def laws_of(
     pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested
-) -> Iterator[tuple["Law", Array, Array]]:
+) -> Iterator[tuple["ChangedLaw", Array, Array]]:
     """Each law of a group with its numbers in the recordings, (recordings, numbers).
 
     The last is what a coefficient of the group moves of them, (numbers, coefficients).
@@ -184,25 +184,29 @@ def laws_of(
     every = np.eye(offsets.shape[1])
     if group.laws:
         for candidate, coefficients in group.laws:
-            yield Law(candidate, known=True), np.outer(1 + offsets[:, 0], coefficients), coefficients[:, None]
+            yield ChangedLaw(candidate, known=True), np.outer(1 + offsets[:, 0], coefficients), coefficients[:, None]
         return
     if group.whole_law:
         size = group.candidate.size
         level = common_values(table, found)[group.common[:size]] + pooled.design.simulation.coefficients_of(
             group.candidate
         )
-        yield Law(group.candidate, known=True), np.concatenate([level, group.candidate.shape]) + offsets, every
+        yield ChangedLaw(group.candidate, known=True), np.concatenate([level, group.candidate.shape]) + offsets, every
         return
     start = 0
     for candidate in group.parts or (group.candidate,):
         own = slice(start, start + candidate.size)
         start = own.stop
         mean = _level(pooled, table, found, candidate, group.common[own])
-        yield Law(candidate, known=mean is not None), offsets[:, own] + (0.0 if mean is None else mean), every[own]
+        yield (
+            ChangedLaw(candidate, known=mean is not None),
+            offsets[:, own] + (0.0 if mean is None else mean),
+            every[own],
+        )
 
 
 @dataclass(frozen=True, eq=False)
-class Law:
+class ChangedLaw:
     """A law whose numbers change: its coefficients, and after them its nonlinear parameters where these change, too.
 
     known: whether they have a level.
@@ -253,7 +257,7 @@ def _level(
 
 
 def _parameters(
-    table: ChangeTable, tested: Tested, law: Law, own: Array, difference: Array, covariance: Array
+    table: ChangeTable, tested: Tested, law: ChangedLaw, own: Array, difference: Array, covariance: Array
 ) -> Iterator[Change]:
     """own: (recordings, numbers) of each recording; difference, covariance: of last less first."""
     candidate = law.candidate

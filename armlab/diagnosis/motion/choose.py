@@ -67,7 +67,7 @@ JUDGED_TOLERANCE = 1e-4  # of fits that are judged on the other half, where a ga
 
 
 @dataclass(frozen=True)
-class Gain:
+class GainOfNumber:
     """What one parameter is worth on windows that took no part.
 
     share: of the squared error without it; enough: the share that matters. p_value: of no gain, one-sided, by the
@@ -95,7 +95,7 @@ class ChosenServo:
     nominal: Array
     fit: ServoFit
     free: NDArray[np.bool_]
-    gains: dict[int, Gain]
+    gains: dict[int, GainOfNumber]
     odd: NDArray[np.intp]
     cost: float
 
@@ -514,7 +514,7 @@ def _with_parameter(
     return min(fits, key=lambda each: each.rms)
 
 
-def is_finding(gain: Gain, looks: int, tuning: MotionTuning = DEFAULT) -> bool:
+def is_finding(gain: GainOfNumber, looks: int, tuning: MotionTuning = DEFAULT) -> bool:
     """Whether a gain matters, and is hardly chance. looks: number of tests in the diagnosis."""
     return gain.share > gain.enough and gain.p_value * TESTS_OF_GAIN * looks < tuning.max_p_value
 
@@ -571,22 +571,26 @@ def _total(errors: Array) -> float:
     return float(np.sum(errors**2))
 
 
-def _gain_of(windows: Windows, fit: ServoFit, number: int, known: tuple[Array, Array], tuning: MotionTuning) -> Gain:
+def _gain_of(
+    windows: Windows, fit: ServoFit, number: int, known: tuple[Array, Array], tuning: MotionTuning
+) -> GainOfNumber:
     """What a fitted parameter is worth. known: the simulation's numbers; the errors (samples,) with the parameter."""
     base, judged = known
     if not np.isfinite(base[number]):
-        return Gain(1.0, tuning.min_gain, 0.0, np.inf, float(np.sqrt(np.mean(judged**2))))
+        return GainOfNumber(1.0, tuning.min_gain, 0.0, np.inf, float(np.sqrt(np.mean(judged**2))))
     held, fixed = with_nominal(fit, base, number)
     return gain_of(windows, errors_on_other_half(windows, held, fixed, tuning), judged, fit.noise, tuning)
 
 
-def gain_of(windows: Windows, without: Array, with_it: Array, noise: float, tuning: MotionTuning = DEFAULT) -> Gain:
+def gain_of(
+    windows: Windows, without: Array, with_it: Array, noise: float, tuning: MotionTuning = DEFAULT
+) -> GainOfNumber:
     """What a parameter is worth: errors without and with it, (samples,) each, learned on the other half; noise: of
     reading, rad."""
     squares = [window_squares(windows, errors) for errors in (without, with_it)]
     match = chance_of_match(windows.window, without, with_it, noise)
     before, after = (float(np.mean(errors**2)) for errors in (without, with_it))
-    return Gain(
+    return GainOfNumber(
         share=1 - after / max(before, 1e-300),
         enough=least_gain(before, noise, tuning),
         p_value=min(chance_of_gain(squares[0] - squares[1]), match),

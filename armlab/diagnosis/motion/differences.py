@@ -8,7 +8,7 @@ from scipy.stats import t as student
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.arm_fit import ArmFit, number_of_tests
-from armlab.diagnosis.motion.choose import TESTS_OF_GAIN, ChosenServo, Gain
+from armlab.diagnosis.motion.choose import TESTS_OF_GAIN, ChosenServo, GainOfNumber
 from armlab.diagnosis.motion.held_out import command_error, rms_of, settled_errors
 from armlab.diagnosis.motion.result import ServoFinding
 from armlab.diagnosis.motion.separate import TORQUE_SCALED, confused_parameters, has_weak_load
@@ -125,7 +125,7 @@ def _models_of(fit: ArmFit) -> list[JointModel | None]:
     ]
 
 
-def _corrected_chance(gain: Gain, joints: int) -> float:
+def _corrected_chance(gain: GainOfNumber, joints: int) -> float:
     """P-value of no gain, corrected for all tests of an arm."""
     return min(gain.p_value * TESTS_OF_GAIN * number_of_tests(joints), 1.0)
 

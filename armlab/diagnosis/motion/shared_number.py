@@ -31,7 +31,7 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.motion.arm_fit import ArmFit, fit_arm, number_of_tests
 from armlab.diagnosis.motion.choose import (
     ChosenServo,
-    Gain,
+    GainOfNumber,
     chance_of_gain,
     chance_of_match,
     errors_on_other_half,
@@ -164,7 +164,7 @@ class FoundNumber:
     error: float
     windows: int
     squares: dict[int, float]
-    gain: Gain
+    gain: GainOfNumber
 
 
 def weigh(
@@ -359,9 +359,9 @@ def _is_made_by_encoder_steps(
 
 def _gain_of_all(
     joints: Sequence[JointModel], without: Sequence[Array], with_it: Sequence[Array], tuning: MotionTuning
-) -> Gain:
+) -> GainOfNumber:
     """What a number is worth over all joints, of errors over those with it. share: at the joint that gains most."""
-    gains, noises, scaled = list[Gain](), list[float](), list[tuple[Array, Array]]()
+    gains, noises, scaled = list[GainOfNumber](), list[float](), list[tuple[Array, Array]]()
     for joint, one, two in zip(joints, without, with_it, strict=True):
         noises.append(reading_noise(joint.windows, joint.values))
         gains.append(gain_of(joint.windows, one, two, noises[-1], tuning))

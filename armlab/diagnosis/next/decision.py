@@ -11,7 +11,7 @@ from scipy.stats import norm
 from armlab.common.arrays import Array
 from armlab.diagnosis.next.moments import Index, draw_coefficients, solve_least_squares
 from armlab.diagnosis.next.prepare import PreparedQuestions
-from armlab.diagnosis.next.question import Law, Question, Rival
+from armlab.diagnosis.next.question import Law, Question, RivalLaw
 from armlab.diagnosis.settings import Settings
 
 MIN_SEPARATION = 1e-9  # standard errors
@@ -47,7 +47,7 @@ def log_doubt(question: Question, gram: Array, rows: float) -> float:
     return float(logsumexp(out)) if out else 0.0
 
 
-def _log_pair_doubt(right: Rival, other: Rival, rests: list[Array], extras: Index, rows: float) -> float:
+def _log_pair_doubt(right: RivalLaw, other: RivalLaw, rests: list[Array], extras: Index, rows: float) -> float:
     """Log chance that another rival stays where one is right, over the sizes that it may have."""
     out = []
     for law, sizes in right.possible_sizes:

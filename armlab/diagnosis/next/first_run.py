@@ -8,7 +8,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.diagnosis.next.moments import Index, Moments
+from armlab.diagnosis.next.moments import DesignMoments, Index
 from armlab.diagnosis.next.question import Layout
 from armlab.diagnosis.next.sampling import Sampling, kept_columns
 from armlab.diagnosis.settings import Settings
@@ -90,7 +90,7 @@ class FirstRun:
         slow: list[float] = np.maximum(noisy, tuning.creep_ratio * speed).tolist()
         return tuple(slow)
 
-    def moments(self, columns: Array, noise: Noise, role: Role) -> Moments:
+    def moments(self, columns: Array, noise: Noise, role: Role) -> DesignMoments:
         """Moments of the rows of a role in which a joint moves. columns: (rows, joints, columns)."""
         size = columns.shape[2]
         whole = np.concatenate([columns, self.torque[:, :, None]], axis=2)
@@ -99,7 +99,7 @@ class FirstRun:
             for part in self.observed.of_role(role, joint):
                 rows = noise.whitened(whole[:, joint], joint, [part])
                 gram += rows.T @ rows
-        return Moments(gram[:size, :size], gram[:size, size])
+        return DesignMoments(gram[:size, :size], gram[:size, size])
 
     def _fit_residual(self, columns: Array) -> Array:
         flat, torque = columns.reshape(-1, columns.shape[2]), self.torque.reshape(-1)

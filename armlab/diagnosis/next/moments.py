@@ -16,24 +16,24 @@ Index = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
-class Moments:
+class DesignMoments:
     """gram: (columns, columns), of whitened rows. vector: (columns,), with the whitened torque."""
 
     gram: Array
     vector: Array
 
-    def select(self, kept: Index) -> "Moments":
+    def select(self, kept: Index) -> "DesignMoments":
         """The moments of the `kept` columns alone."""
-        return Moments(self.gram[np.ix_(kept, kept)], self.vector[kept])
+        return DesignMoments(self.gram[np.ix_(kept, kept)], self.vector[kept])
 
-    def __add__(self, other: "Moments") -> "Moments":
+    def __add__(self, other: "DesignMoments") -> "DesignMoments":
         """Moments of both sets of rows, for one set of coefficients."""
-        return Moments(self.gram + other.gram, self.vector + other.vector)
+        return DesignMoments(self.gram + other.gram, self.vector + other.vector)
 
 
-def empty_moments(columns: int) -> Moments:
+def empty_moments(columns: int) -> DesignMoments:
     """Moments of no rows."""
-    return Moments(np.zeros((columns, columns)), np.zeros(columns))
+    return DesignMoments(np.zeros((columns, columns)), np.zeros(columns))
 
 
 def solve_least_squares(gram: Array, chosen: Index, right: Array) -> Array:
@@ -72,7 +72,7 @@ DRAWS_PER_SAMPLE = 20  # draws for each one that is wanted
 
 
 def draw_coefficients(
-    seen: Moments, free: Index, own: Index, candidate: Candidate, count: int, rng: np.random.Generator
+    seen: DesignMoments, free: Index, own: Index, candidate: Candidate, count: int, rng: np.random.Generator
 ) -> tuple[Index, Array]:
     """Indices of the free columns and a law's own, and draws from the posterior of their coefficients.
 

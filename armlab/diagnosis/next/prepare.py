@@ -11,7 +11,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.next.first_run import FirstRun, FoundEffect, PresentModel, observe_first_run
-from armlab.diagnosis.next.moments import Index, Moments, empty_moments
+from armlab.diagnosis.next.moments import DesignMoments, Index, empty_moments
 from armlab.diagnosis.next.question import (
     Layout,
     Name,
@@ -61,21 +61,21 @@ class PreparedQuestions:
     layout: Layout
     questions: tuple[Question, ...]
     sampling: Sampling
-    seen: Moments
-    before: Moments
+    seen: DesignMoments
+    before: DesignMoments
     rows: int
     learned_share: float
     first: FirstRun | None
 
-    def moments(self, scene: Scene) -> Moments:
+    def moments(self, scene: Scene) -> DesignMoments:
         """Moments of a designed motion, of the share from which a diagnosis will learn."""
         whole = self.layout.moments(scene, self.sampling.filter(len(scene.time)), self.sampling)
-        return Moments(self.learned_share * whole.gram, self.learned_share * whole.vector)
+        return DesignMoments(self.learned_share * whole.gram, self.learned_share * whole.vector)
 
     @property
-    def known_moments(self) -> Moments:
+    def known_moments(self) -> DesignMoments:
         """Moments of the first recording, with the prior of the links."""
-        return Moments(self.seen.gram + self.layout.prior, self.seen.vector)
+        return DesignMoments(self.seen.gram + self.layout.prior, self.seen.vector)
 
     def rows_with(self, samples: int) -> float:
         """Rows of both recordings from which a diagnosis learns, all joints; samples: of a designed motion."""
@@ -146,7 +146,7 @@ class _Preparation:
         questions = []
         for group in groups:
             free, found = self._free_columns(group), self._found_columns(group)
-            known = Moments(seen + self.layout.prior, whole.vector)
+            known = DesignMoments(seen + self.layout.prior, whole.vector)
             joints = len(self.present.arm)
             rivals = choose_rivals(
                 self._rival_choices(group), found, known, shown, places, self.first is not None, joints
@@ -154,7 +154,7 @@ class _Preparation:
             questions.append(Question(rivals, free, found, inseparable_rivals(rivals, free, shown + self.layout.prior)))
         return self._keep_needed_columns(tuple(questions), sampling, whole, before)
 
-    def _recorded_moments(self, groups: tuple[RivalGroup, ...]) -> tuple[Sampling, Moments, Moments]:
+    def _recorded_moments(self, groups: tuple[RivalGroup, ...]) -> tuple[Sampling, DesignMoments, DesignMoments]:
         """The sampling, and moments of all rows and of those from which a diagnosis learns."""
         if self.first is None:
             return self.white, empty_moments(self.layout.size), empty_moments(self.layout.size)
@@ -177,10 +177,10 @@ class _Preparation:
         sticking = {name.joint for name in named if name.facts.sticks}
         return tuple(each if joint + 1 in sticking else 0.0 for joint, each in enumerate(sampling.standing))
 
-    def _with_torque_of(self, moments: Moments, part: FoundEffect) -> Moments:
+    def _with_torque_of(self, moments: DesignMoments, part: FoundEffect) -> DesignMoments:
         """The moments with the torque of a part added to the residual."""
         candidate, values = part
-        return Moments(moments.gram, moments.vector + moments.gram[:, self.layout.indices_of(candidate)] @ values)
+        return DesignMoments(moments.gram, moments.vector + moments.gram[:, self.layout.indices_of(candidate)] @ values)
 
     def _free_columns(self, group: RivalGroup) -> Index:
         """Columns that may be fitted beside the rivals of a group: what was found, and usual friction of all joints."""
@@ -214,7 +214,7 @@ class _Preparation:
         return np.asarray(np.sum([each.gram for each in moments], axis=0))
 
     def _keep_needed_columns(
-        self, questions: tuple[Question, ...], sampling: Sampling, whole: Moments, before: Moments
+        self, questions: tuple[Question, ...], sampling: Sampling, whole: DesignMoments, before: DesignMoments
     ) -> PreparedQuestions:
         """The questions with only the columns that they need. whole, before: moments of all columns."""
         laws = [law.columns for question in questions for rival in question.rivals for law in rival.laws]

@@ -14,7 +14,7 @@ from armlab.common.arrays import Array
 from armlab.common.errors import DataError, InputError
 from armlab.common.settings import Settings
 from armlab.diagnosis.next.decision import decision_strength
-from armlab.diagnosis.next.moments import Moments
+from armlab.diagnosis.next.moments import DesignMoments
 from armlab.diagnosis.next.motion import Budget, build_excitation_problem
 from armlab.diagnosis.next.prepare import LinkKnowledge, PreparedQuestions, prepare_questions
 from armlab.diagnosis.next.question import Name
@@ -53,7 +53,7 @@ class TellApartProblem(ExcitationProblem):
         """Rows of both recordings from which a diagnosis learns, all joints."""
         return self.prepared.rows_with(self.samples)
 
-    def moments(self, point: Array) -> Moments:
+    def moments(self, point: Array) -> DesignMoments:
         """Moments of the motion of a point (dimension,)."""
         motion = self.trajectory.motions(point[None], self.times).motion.select(np.intp(0))
         return self.prepared.moments(self.prepared.present.scene(motion, self.times))

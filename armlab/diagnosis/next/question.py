@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.next.moments import ROUNDING_SHARE, Index, Moments, unexplained_power
+from armlab.diagnosis.next.moments import ROUNDING_SHARE, DesignMoments, Index, unexplained_power
 from armlab.diagnosis.next.sampling import Sampling, kept_columns
 from armlab.effects.contract import Candidate, Effect, Scene
 from armlab.effects.library import effect_named
@@ -59,7 +59,7 @@ class Law:
 
 
 @dataclass(frozen=True, eq=False)
-class Rival:
+class RivalLaw:
     """A name that may be right. Its law is laws[0] with these values; the other laws are other shapes of it.
 
     weight: its probability after the first recording, up to a factor. sizes: for each law draws of its coefficients
@@ -88,7 +88,7 @@ class Question:
     rival if the first one is right.
     """
 
-    rivals: tuple[Rival, ...]
+    rivals: tuple[RivalLaw, ...]
     free: Index
     found: Index
     inseparable: Array
@@ -157,11 +157,11 @@ class Layout:
         """Indices of the columns of a candidate."""
         return self.places[self.candidates.index(candidate)]
 
-    def moments(self, scene: Scene, keep: Filter, sampling: Sampling) -> Moments:
+    def moments(self, scene: Scene, keep: Filter, sampling: Sampling) -> DesignMoments:
         """Moments of a motion whose torque is not recorded yet: the vector is zero."""
         columns = kept_columns(self.base, self.candidates, scene, keep, smooth=True)
         rows = sampling.whiten(columns, scene.motion.velocity)
-        return Moments(rows.T @ rows, np.zeros(self.size))
+        return DesignMoments(rows.T @ rows, np.zeros(self.size))
 
 
 def build_layout(base: BaseParameters, candidates: list[Candidate], scene: Scene, prior: Array) -> Layout:
@@ -182,7 +182,7 @@ def is_in_free_links(name: Name, free: Index) -> bool:
     return 0 in free and name.facts.in_links
 
 
-def inseparable_rivals(rivals: tuple[Rival, ...], free: Index, gram: Array) -> Array:
+def inseparable_rivals(rivals: tuple[RivalLaw, ...], free: Index, gram: Array) -> Array:
     """Matrix (rivals, rivals): true where a rich motion cannot refute the second rival if the first one is right.
 
     gram: of rich motions, with the prior. An error of links that are free anyway refutes no other name.

@@ -11,7 +11,14 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.next.first_run import PresentModel
 from armlab.diagnosis.next.moments import Index
 from armlab.diagnosis.next.prepare import PreparedQuestions
-from armlab.diagnosis.next.question import CLEAR_SEPARATION, Layout, Question, Rival, build_layout, inseparable_rivals
+from armlab.diagnosis.next.question import (
+    CLEAR_SEPARATION,
+    Layout,
+    Question,
+    RivalLaw,
+    build_layout,
+    inseparable_rivals,
+)
 from armlab.effects.transmission import Transmission
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
@@ -52,7 +59,7 @@ def find_remedies(
 
 
 def _remedy_by_load(
-    prepared: PreparedQuestions, question: Question, rivals: tuple[Rival, ...], motion: Motion, times: Array
+    prepared: PreparedQuestions, question: Question, rivals: tuple[RivalLaw, ...], motion: Motion, times: Array
 ) -> Iterator[Remedy]:
     """The same motion with and without a load that is known."""
     x, y, z = LOAD_POSITION
@@ -66,7 +73,7 @@ def _remedy_by_load(
 
 
 def _remedy_by_tilt(
-    prepared: PreparedQuestions, question: Question, rivals: tuple[Rival, ...], motion: Motion, times: Array
+    prepared: PreparedQuestions, question: Question, rivals: tuple[RivalLaw, ...], motion: Motion, times: Array
 ) -> Iterator[Remedy]:
     """The same motion on the level and on a base that is tilted by a known angle."""
     arm = _tilt_base(prepared.present.arm)
@@ -88,17 +95,17 @@ def _tilt_base(arm: Arm) -> Arm:
     return replace(arm, gravity=(x, y, z))
 
 
-def _rival_in_layout(rival: Rival, layout: Layout) -> Rival:
+def _rival_in_layout(rival: RivalLaw, layout: Layout) -> RivalLaw:
     return replace(rival, laws=tuple(replace(law, columns=layout.indices_of(law.candidate)) for law in rival.laws))
 
 
-def _pair_separation(rivals: tuple[Rival, ...], free: Index, gram: Array) -> float:
+def _pair_separation(rivals: tuple[RivalLaw, ...], free: Index, gram: Array) -> float:
     question = Question(rivals, free, free, inseparable_rivals(rivals, free, gram))
     return question.separation(gram, 0, 1)
 
 
 def _remedy_by_removal(
-    prepared: PreparedQuestions, question: Question, rivals: tuple[Rival, ...], motion: Motion, times: Array
+    prepared: PreparedQuestions, question: Question, rivals: tuple[RivalLaw, ...], motion: Motion, times: Array
 ) -> Iterator[Remedy]:
     """The same motion with and without what a link carries: a load is gone then, a wrong link is still wrong."""
     for rival in rivals:
@@ -114,7 +121,7 @@ def _remedy_by_removal(
             yield Remedy(f"the motion with and without the load on {link}", separation)
 
 
-def _remedy_by_data_sheet(prepared: PreparedQuestions, rivals: tuple[Rival, ...]) -> Iterator[Remedy]:
+def _remedy_by_data_sheet(prepared: PreparedQuestions, rivals: tuple[RivalLaw, ...]) -> Iterator[Remedy]:
     """A value that the maker states."""
     for rival in rivals:
         armature = rival.laws[0].candidate.joint_fields(rival.values).get("armature")
@@ -126,7 +133,7 @@ def _remedy_by_data_sheet(prepared: PreparedQuestions, rivals: tuple[Rival, ...]
 
 
 def _remedy_by_encoder(
-    prepared: PreparedQuestions, rivals: tuple[Rival, ...], motion: Motion, times: Array
+    prepared: PreparedQuestions, rivals: tuple[RivalLaw, ...], motion: Motion, times: Array
 ) -> Iterator[Remedy]:
     """An encoder behind the gear measures the twist of the drive train."""
     for rival in rivals:

@@ -11,14 +11,14 @@ from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.next.first_run import FoundEffect
 from armlab.diagnosis.next.moments import (
+    DesignMoments,
     Index,
-    Moments,
     count_independent,
     draw_coefficients,
     solve_least_squares,
     unexplained_power,
 )
-from armlab.diagnosis.next.question import Law, Name, Rival, is_in_free_links
+from armlab.diagnosis.next.question import Law, Name, RivalLaw, is_in_free_links
 from armlab.diagnosis.next.verdict_file import Finding
 from armlab.effects.contract import Candidate, Family, Scene
 from armlab.effects.library import library
@@ -99,12 +99,12 @@ class RivalChoice:
 def choose_rivals(
     choices: list[RivalChoice],
     free: Index,
-    seen: Moments,
+    seen: DesignMoments,
     rich: Array,
     library_places: int,
     recorded: bool,
     joints: int,
-) -> tuple[Rival, ...]:
+) -> tuple[RivalLaw, ...]:
     """Rivals with the laws that come closest, and the sizes with which they do.
 
     seen: of the first recording, or of rich motions where there is none (recorded: False). rich: Gram matrix of rich
@@ -115,7 +115,7 @@ def choose_rivals(
     return _weight_rivals(rivals, free, seen) if recorded else rivals
 
 
-def _weight_rivals(rivals: tuple[Rival, ...], free: Index, seen: Moments) -> tuple[Rival, ...]:
+def _weight_rivals(rivals: tuple[RivalLaw, ...], free: Index, seen: DesignMoments) -> tuple[RivalLaw, ...]:
     """The rivals with their weights and sizes after the recording.
 
     A weight follows from the likelihood, less what the parameters gain by chance.
@@ -128,7 +128,7 @@ def _weight_rivals(rivals: tuple[Rival, ...], free: Index, seen: Moments) -> tup
     return tuple(replace(rival, weight=weight, sizes=_draw_sizes(rival, fit, free, seen)) for rival, fit, weight in out)
 
 
-def _draw_sizes(rival: Rival, fits: list[float], free: Index, seen: Moments) -> tuple[Array, ...]:
+def _draw_sizes(rival: RivalLaw, fits: list[float], free: Index, seen: DesignMoments) -> tuple[Array, ...]:
     """Draws of the coefficients of each law, more of a law that fits better."""
     share = np.exp(np.array(fits) - max(fits))
     counts = np.round(SIZE_DRAWS * share / share.sum()).astype(int).tolist()
@@ -148,7 +148,7 @@ class _FindingSignal:
     products: Array
 
 
-def _finding_signal(choices: list[RivalChoice], free: Index, seen: Moments) -> _FindingSignal:
+def _finding_signal(choices: list[RivalChoice], free: Index, seen: DesignMoments) -> _FindingSignal:
     sized = next((each for each in choices if each.values is not None), None)
     if sized is not None and sized.values is not None:
         own, values = sized.laws[0][1], sized.values
@@ -158,7 +158,7 @@ def _finding_signal(choices: list[RivalChoice], free: Index, seen: Moments) -> _
     return _FindingSignal(own, values, seen.gram[:, own] @ values)
 
 
-def explained_power(seen: Moments, free: Index, columns: Index) -> float:
+def explained_power(seen: DesignMoments, free: Index, columns: Index) -> float:
     """Power of the recording that a law and the free columns explain together, in standard errors squared."""
     chosen = np.append(free, columns)
     return float(solve_least_squares(seen.gram, chosen, seen.vector) @ seen.vector[chosen])
@@ -167,13 +167,13 @@ def explained_power(seen: Moments, free: Index, columns: Index) -> float:
 def _build_rival(
     choice: RivalChoice,
     free: Index,
-    seen: Moments,
+    seen: DesignMoments,
     rich: Array,
     signal: _FindingSignal,
     library_places: int,
     recorded: bool,
     joints: int,
-) -> Rival:
+) -> RivalLaw:
     if recorded:
         left = [-explained_power(seen, free, columns) for _, columns in choice.laws]
     else:
@@ -187,10 +187,12 @@ def _build_rival(
     values = choice.values
     if values is None:
         values = _fit_size(laws[0].columns, free, seen, rich, signal, recorded)
-    return Rival(choice.name, laws, values)
+    return RivalLaw(choice.name, laws, values)
 
 
-def _fit_size(columns: Index, free: Index, seen: Moments, rich: Array, signal: _FindingSignal, recorded: bool) -> Array:
+def _fit_size(
+    columns: Index, free: Index, seen: DesignMoments, rich: Array, signal: _FindingSignal, recorded: bool
+) -> Array:
     """Coefficients (columns,) of a rival that the verdict did not find.
 
     They are fitted to the recording where this differs from the finding by more than noise. Else they imitate the

@@ -28,7 +28,7 @@ TRUE_COEFFICIENTS = {"viscous_friction": 1.5, "coulomb_friction": 2.0, "rotor_in
 
 
 @dataclass(frozen=True)
-class Noise:
+class SimulatedNoise:
     """torque: standard deviation, N m; colour: correlation of neighbouring samples; encoder: rad, white."""
 
     torque: float = 0.2
@@ -37,13 +37,13 @@ class Noise:
 
 
 @dataclass(frozen=True, eq=False)
-class Experiment:
+class CoverageExperiment:
     """An arm with a known model, and how it is recorded."""
 
     arm: Arm
     structure: Structure
     truth: Array
-    noise: Noise
+    noise: SimulatedNoise
     rate_hz: float = 250.0
     seconds: float = 20.0
 
@@ -81,18 +81,18 @@ def fourier_motion(time: Array, joints: int, rng: np.random.Generator) -> Motion
     return Motion(position, velocity, -(sine * omega**2) @ a - (cosine * omega**2) @ b)
 
 
-def three_joint_experiment(noise: Noise) -> Experiment:
+def three_joint_experiment(noise: SimulatedNoise) -> CoverageExperiment:
     """The built-in three-joint arm with friction, rotors and offsets."""
     arm = load_arm("irb120-arm")
     structure = Structure(arm, usual_components(arm)).separable()[0]
     own = [TRUE_COEFFICIENTS[part.effect] for part in structure.components]
-    return Experiment(arm, structure, np.concatenate([structure.base.values(arm.parameters), own]), noise)
+    return CoverageExperiment(arm, structure, np.concatenate([structure.base.values(arm.parameters), own]), noise)
 
 
 NOISE_KINDS = {
-    "as an arm's": Noise(),
-    "slow torque noise": Noise(0.2, 0.97, 2e-5),
-    "coarse encoder": Noise(0.2, 0.5, 1e-4),
+    "as an arm's": SimulatedNoise(),
+    "slow torque noise": SimulatedNoise(0.2, 0.97, 2e-5),
+    "coarse encoder": SimulatedNoise(0.2, 0.5, 1e-4),
 }
 
 

@@ -27,7 +27,7 @@ from armlab.diagnosis.next.confusability.card import (
     MIN_CONFUSED_COSINE,
     VIEWS,
     Card,
-    Entry,
+    CardEntry,
     confusability_card,
     read_planned_motions,
 )
@@ -77,7 +77,7 @@ def card_lines(card: Card) -> Iterator[str]:
         yield from (f"  {each.label:<44} {_rivals_text(card, each, view)}" for each in mixed)
 
 
-def _rivals_text(card: Card, entry: Entry, view: str) -> str:
+def _rivals_text(card: Card, entry: CardEntry, view: str) -> str:
     names = [f"{card.entries[each.index].label} {each.cosine:.3f}" for each in entry.rivals[view][:MAX_SHOWN_RIVALS]]
     more = len(entry.rivals[view]) - MAX_SHOWN_RIVALS
     return "; ".join(names) + (f"; and {more} more" if more > 0 else "")
@@ -93,7 +93,7 @@ def card_markdown(card: Card) -> str:
     return markdown_page("Confusability", *parts)
 
 
-def _markdown_row(card: Card, entry: Entry, view: str) -> list[str]:
+def _markdown_row(card: Card, entry: CardEntry, view: str) -> list[str]:
     rivals = [
         f"{card.entries[each.index].label} ({each.cosine:.3f}, {_size_text(each.separation)})"
         for each in entry.rivals[view][:MAX_SHOWN_RIVALS]
@@ -134,7 +134,7 @@ def card_content(card: Card) -> dict[str, Any]:
     }
 
 
-def _entry_content(card: Card, entry: Entry) -> dict[str, Any]:
+def _entry_content(card: Card, entry: CardEntry) -> dict[str, Any]:
     views = {
         view: {
             "absorbed": round(entry.absorbed[view], 6),
@@ -278,7 +278,7 @@ def _verdict(card: Card) -> str:
     )
 
 
-def _words(arm: Arm, entry: Entry) -> str:
+def _words(arm: Arm, entry: CardEntry) -> str:
     """Effect, place and form as a person says them."""
     name = f"{effect_in_words(entry.effect)}, {place_in_words(arm, entry.effect, entry.joint, entry.joints)}"
     return f"{name} ({entry.form})" if entry.form else name

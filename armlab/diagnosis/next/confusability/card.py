@@ -118,7 +118,7 @@ VIEWS = ("nominal", "refit")
 
 
 @dataclass(frozen=True)
-class Rival:
+class ConfusedEffect:
     """Another effect that can imitate an entry. cosine: 1 where no amount of data separates the two.
 
     separation: smallest size of the entry, as rms torque in units of noise, at which the two differ by
@@ -131,7 +131,7 @@ class Rival:
 
 
 @dataclass(frozen=True)
-class Entry:
+class CardEntry:
     """One effect at one place, by view: absorbed share, smallest size that shows, rivals, the most alike first.
 
     size: rms torque in units of the noise. joint: from 1, the link for parameters of a link, None for the robot.
@@ -143,7 +143,7 @@ class Entry:
     form: str
     absorbed: dict[str, float]
     shows_from: dict[str, float]
-    rivals: dict[str, tuple[Rival, ...]]
+    rivals: dict[str, tuple[ConfusedEffect, ...]]
 
     @property
     def label(self) -> str:
@@ -160,7 +160,7 @@ class Card:
 
     arm: Arm
     trajectory: str
-    entries: tuple[Entry, ...]
+    entries: tuple[CardEntry, ...]
     cosines: dict[str, Array]
     noise: Array
     rows: float
@@ -224,7 +224,7 @@ def _default_noise(scenes: Sequence[Scene]) -> Array:
     return np.asarray(np.maximum(NOISE_SHARE * rms, MIN_NOISE))
 
 
-def _card_entry(index: int, views: dict[str, Confusion], rows: float) -> Entry:
+def _card_entry(index: int, views: dict[str, Confusion], rows: float) -> CardEntry:
     candidate = views[VIEWS[0]].candidates[index]
     absorbed, shows, rivals = {}, {}, {}
     for name, view in views.items():
@@ -237,13 +237,13 @@ def _card_entry(index: int, views: dict[str, Confusion], rows: float) -> Entry:
             if not _is_nested(candidate, view.candidates[other])
         ]
         rivals[name] = tuple(_confused_rival(view, index, other, rows) for other in alike)
-    return Entry(candidate.effect, candidate.joint, candidate.joints, candidate.form, absorbed, shows, rivals)
+    return CardEntry(candidate.effect, candidate.joint, candidate.joints, candidate.form, absorbed, shows, rivals)
 
 
-def _confused_rival(view: Confusion, index: int, other: int, rows: float) -> Rival:
+def _confused_rival(view: Confusion, index: int, other: int, rows: float) -> ConfusedEffect:
     cosine = float(view.covered[index, other])
     apart = float(np.sqrt(max(1 - cosine**2, 0.0)))
-    return Rival(other, cosine, size_to_show(float(view.visible[index]) * apart, rows))
+    return ConfusedEffect(other, cosine, size_to_show(float(view.visible[index]) * apart, rows))
 
 
 def size_to_show(share: float, rows: float) -> float:

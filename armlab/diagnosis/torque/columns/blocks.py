@@ -207,7 +207,7 @@ def split_folds(rows: WhitenedRows, values: Array, precision: Array, count: int)
 
 
 @dataclass(frozen=True)
-class Gain:
+class HeldOutGain:
     """By how much squared held-out errors fall, a share of what is left of them, and one-sided p-values of that.
 
     p_value asks whether stretches of time profit alike: what a few of them hold may be a fault of theirs. chance asks
@@ -220,7 +220,7 @@ class Gain:
     change: float
 
 
-def held_out_gain(without: Array, with_it: Array, blocks: NDArray[np.intp]) -> Gain:
+def held_out_gain(without: Array, with_it: Array, blocks: NDArray[np.intp]) -> HeldOutGain:
     """The gain from errors (rows,) without and with something.
 
     What is left times what is predicted is how far chance carries the gain, stretch by stretch; as many stretches
@@ -236,4 +236,4 @@ def held_out_gain(without: Array, with_it: Array, blocks: NDArray[np.intp]) -> G
     noise = 2 * float(np.sqrt(carried @ carried))
     count = float(np.sum(power)) ** 2 / max(float(power @ power), 1e-300)
     chance = student_tail(gain / noise, count) if noise > 0 else 1.0
-    return Gain(gain / max(float(with_it @ with_it), 1e-300), p_value, chance, float(np.mean(predicted**2)))
+    return HeldOutGain(gain / max(float(with_it @ with_it), 1e-300), p_value, chance, float(np.mean(predicted**2)))

@@ -11,7 +11,7 @@ from armlab.common.probabilities import chi_square_tail
 from armlab.diagnosis.torque.columns.blocks import (
     BlockCovariance,
     Folds,
-    Gain,
+    HeldOutGain,
     WhitenedRows,
     block_covariance,
     block_numbers,
@@ -29,7 +29,7 @@ from armlab.diagnosis.tuning import EvidenceTuning
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class StatesCompared:
     """The state of a round beside others, whose groups are its own and some more."""
 
     model: FittedModel
@@ -75,7 +75,7 @@ class Comparison:
         at = {int(column): rank + place for place, column in enumerate(self.wide.columns)}
         return [*range(rank), *(at[int(column)] for column in self.model.solver.fit(state).columns)]
 
-    def gains(self, fit: Fit, less: Fit, joints: tuple[int, ...]) -> dict[int, tuple[Gain, Gain]]:
+    def gains(self, fit: Fit, less: Fit, joints: tuple[int, ...]) -> dict[int, tuple[HeldOutGain, HeldOutGain]]:
         """Per joint the gain on validation rows, and on identification stretches held out in turn."""
         pair = [self._in_turn(each.state, joints) for each in (less, fit)]
         blocks = self.folds.rows.blocks
@@ -99,7 +99,7 @@ class Comparison:
         """At all joints."""
         return dict(enumerate(self.folds.errors(self._chosen(self.state))))
 
-    def validation_gain(self, fit: Fit, less: Fit, joint: int) -> Gain:
+    def validation_gain(self, fit: Fit, less: Fit, joint: int) -> HeldOutGain:
         """The gain at a joint on validation rows."""
         observed, noise = self.model.design.observed, self.model.noise
         left = np.column_stack([self.model.residual_at(joint, each) for each in (less, fit)])
@@ -159,11 +159,11 @@ class Judge:
         return self.model.design.settings.tuning.evidence
 
     @cached_property
-    def compared(self) -> Comparison:
+    def compared(self) -> StatesCompared:
         """The state beside the simpler groups that its own contain."""
         more = {other for group in self.state.groups for other in self.simpler(group)}
         more |= {other for formula in self._best_formulas.values() for other in formula.groups}
-        return Comparison(self.model, self.state, frozenset(more))
+        return StatesCompared(self.model, self.state, frozenset(more))
 
     @cached_property
     def _best_formulas(self) -> dict[int, State]:
@@ -391,7 +391,7 @@ class Judge:
         self,
         fit: Fit,
         less: Fit,
-        gains: dict[int, tuple[Gain, Gain]],
+        gains: dict[int, tuple[HeldOutGain, HeldOutGain]],
         tested: tuple[float, int],
         score: float,
     ) -> Evidence:
@@ -419,7 +419,7 @@ class Judge:
         )
 
 
-def _validation_refutes(validated: Gain, inside: Gain, growth: float, tuning: EvidenceTuning) -> bool:
+def _validation_refutes(validated: HeldOutGain, inside: HeldOutGain, growth: float, tuning: EvidenceTuning) -> bool:
     """Whether validation data speak against an effect: by not profiting although they excite it, or surely.
 
     growth: of their error as it is, not whitened, as a share. A sure whitened loss that is little beside the gain in

@@ -38,7 +38,7 @@ MOST_COLOUR = 1.0  # of errors, a logarithm; beyond, the rate of samples says mo
 
 
 @dataclass(frozen=True)
-class _Trial:
+class _NameTrial:
     """A law in the place of a finding. score: of the model with it; growth: of the held-out error by it, a share.
 
     own: whether the search took it. early: whether it shifts the torque of a joint that sticks to before its motion,
@@ -85,7 +85,7 @@ def weigh_link(
     """The names of a link (from 0) that is off. claimed: the effects of the model."""
     widths = model.state.widths or ()
     without = State(model.state.groups, _changed(widths, link, 0.0))
-    trials = [_Trial(INERTIAL_ERROR_FACTS.id, link + 1, (), model.fit.score, 0.0, own=True)]
+    trials = [_NameTrial(INERTIAL_ERROR_FACTS.id, link + 1, (), model.fit.score, 0.0, own=True)]
     trials += _in_place(model, without, None, beside=model.state)
     trials += _bodies(model, without, place_body(model, without), None)
     trials += _other_links(model, without, link, max(widths))
@@ -134,7 +134,7 @@ def weigh_structure(model: FittedModel, structure: Structure, claimed: Iterable[
 
 def _weighed(
     kind: Kind,
-    trials: Iterable[_Trial],
+    trials: Iterable[_NameTrial],
     none: Mapping[str, float],
     joint: Place,
     joints: tuple[int, ...],
@@ -143,7 +143,7 @@ def _weighed(
 ) -> Weighed:
     """Each name once, by its likeliest law, and none of them. nameless: the score of a law that has no name."""
     ordered = sorted(trials, key=lambda each: (not each.own, -each.score))
-    known: dict[tuple[str, Place], _Trial] = {}
+    known: dict[tuple[str, Place], _NameTrial] = {}
     for each in ordered:
         if kind == "found" or each.score > model.fit.score:
             known.setdefault((each.effect, each.joint), each)
@@ -155,7 +155,7 @@ def _weighed(
     return (*names, WeighedName(UNKNOWN.id, joint, joints, none))
 
 
-def _for_name(kind: Kind, trial: _Trial, best: float, without: float) -> dict[str, float]:
+def _for_name(kind: Kind, trial: _NameTrial, best: float, without: float) -> dict[str, float]:
     """best: the largest score of a trial; without: the score of a model that holds none of them."""
     deficit = best - trial.score
     out = {
@@ -269,7 +269,7 @@ def _unusual_at(model: FittedModel, joint: Place, groups: Iterable[int]) -> int:
 
 def _in_place(
     model: FittedModel, without: State, own: int | None, joint: int | None = None, beside: State | None = None
-) -> Iterator[_Trial]:
+) -> Iterator[_NameTrial]:
     """The likeliest law of each effect at each place beside a state, the likeliest first.
 
     own: the group that stands there; its effect is always among them. joint: from 0, where the torque has to act.
@@ -297,14 +297,14 @@ def _in_place(
         fit = solver.fit(state)
         growth = _growth(model.moments.heldout_error(fit.coefficients), known)
         named = candidate.first_name(solver.values(fit, number), model.design.scenes)
-        trial = _Trial(named.effect, named.joint, named.joints, fit.score, growth, key == taken)
+        trial = _NameTrial(named.effect, named.joint, named.joints, fit.score, growth, key == taken)
         if candidate.facts.cause == "timing" and _sticks_where_it_acts(model, state, candidate):
             early = bool(solver.values(fit, number)[0] < 0)
             trial = replace(trial, early=early, in_motion=_gain_in_motion(model, without, fit, candidate.rows))
         yield trial
 
 
-def _other_friction(model: FittedModel, without: State, group: int) -> Iterator[_Trial]:
+def _other_friction(model: FittedModel, without: State, group: int) -> Iterator[_NameTrial]:
     """Other friction of a law's joint, beside the usual friction whose place the law took."""
     groups = model.solver.groups
     replaced = {each for each in model.solver.contained(group) if groups[each].candidate.facts.usual}
@@ -341,24 +341,24 @@ def _independent(search: Search, scores: Array, beside: State, share: float) -> 
     return frozenset(int(each) for each in np.flatnonzero(keep) if not search.has_no_room(beside, int(each)))
 
 
-def _bodies(model: FittedModel, without: State, placed: Sequence[PlacedBody], own: int | None) -> Iterator[_Trial]:
+def _bodies(model: FittedModel, without: State, placed: Sequence[PlacedBody], own: int | None) -> Iterator[_NameTrial]:
     """A body that can exist at each link. own: the link whose body is known already."""
     solver, known = model.solver, _held_out(model)
     crowd = solver.tuning.crowd_penalty * solver.crowd(without.groups)
     for each in placed:
         if each.link != own:
             score = solver.fit(without).score + each.gain - float(solver.prices[each.group]) - crowd
-            yield _Trial(PAYLOAD_FACTS.id, each.link, (), score, _growth(each.error, known))
+            yield _NameTrial(PAYLOAD_FACTS.id, each.link, (), score, _growth(each.error, known))
 
 
-def _other_links(model: FittedModel, without: State, link: int, width: float) -> Iterator[_Trial]:
+def _other_links(model: FittedModel, without: State, link: int, width: float) -> Iterator[_NameTrial]:
     """Another link that is off in the place of one (from 0)."""
     known, widths = _held_out(model), without.widths or ()
     for other in range(len(widths)):
         if other != link:
             fit = model.solver.fit(State(without.groups, _changed(widths, other, width)))
             growth = _growth(model.moments.heldout_error(fit.coefficients), known)
-            yield _Trial(INERTIAL_ERROR_FACTS.id, other + 1, (), fit.score, growth)
+            yield _NameTrial(INERTIAL_ERROR_FACTS.id, other + 1, (), fit.score, growth)
 
 
 def _held_out(model: FittedModel) -> Array:

@@ -13,7 +13,7 @@ from armlab.proof.blind.engine import Track
 SATURATION_SHARPNESS = 8  # of saturation: the larger, the sharper
 
 
-class Gain(HiddenEffect):
+class TorqueGain(HiddenEffect):
     """tau is read as (1 + e) tau; other form: less error below a knee. size: |e|."""
 
     effect, forms = "torque_gain_error", ("factor", "bent")

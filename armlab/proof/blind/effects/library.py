@@ -1,7 +1,7 @@
 """All hidden effects that the diagnosis has a name for, in the order of figures."""
 
 from armlab.proof.blind.effects.bodies import Geometry, LinkError, Payload, Tilt
-from armlab.proof.blind.effects.channels import Contact, Delay, EncoderOffset, Gain, Offset, Saturation, Skew
+from armlab.proof.blind.effects.channels import Contact, Delay, EncoderOffset, Offset, Saturation, Skew, TorqueGain
 from armlab.proof.blind.effects.drives import Backlash, Coupling, Elasticity, Rotor
 from armlab.proof.blind.effects.friction import (
     Asymmetric,
@@ -27,7 +27,7 @@ LIBRARY: tuple[type[HiddenEffect], ...] = (
     Presliding,
     Drift,
     Rotor,
-    Gain,
+    TorqueGain,
     Offset,
     Ripple,
     Elasticity,

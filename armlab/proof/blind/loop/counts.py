@@ -51,7 +51,7 @@ def _table_row(case: dict[str, Any], kind: str) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Share:
+class LoopShare:
     """How often a kind of second motion ended in one way. hits: of `cases`."""
 
     hits: int
@@ -73,7 +73,7 @@ class Share:
         return f"{100 * self.value:.0f} % ({100 * low:.0f}-{100 * high:.0f})" if self.cases else "-"
 
 
-Shares = dict[tuple[str, str], Share]
+Shares = dict[tuple[str, str], LoopShare]
 
 
 def count_shares(table: pd.DataFrame, start: str | None = None) -> Shares:
@@ -82,7 +82,7 @@ def count_shares(table: pd.DataFrame, start: str | None = None) -> Shares:
     out: Shares = {}
     for kind in MOTION_KINDS:
         own = part[part["motion"] == kind]["end"].tolist()
-        out |= {(kind, end): Share(own.count(end), len(own)) for end in ENDS}
+        out |= {(kind, end): LoopShare(own.count(end), len(own)) for end in ENDS}
     return out
 
 
@@ -119,7 +119,7 @@ class ChanceBin:
     low: float
     high: float
     expected: float
-    observed: Share
+    observed: LoopShare
 
 
 def reliability_bins(table: pd.DataFrame) -> list[ChanceBin]:
@@ -131,7 +131,7 @@ def reliability_bins(table: pd.DataFrame) -> list[ChanceBin]:
         own = known[(chance >= low) & ((chance < high) | (high == CHANCE_BINS[-1]))]
         if len(own):
             hits = int((own["end"] == "right").sum())
-            out.append(ChanceBin(low, high, float(own["expected right"].mean()), Share(hits, len(own))))
+            out.append(ChanceBin(low, high, float(own["expected right"].mean()), LoopShare(hits, len(own))))
     return out
 
 

@@ -20,7 +20,7 @@ from armlab.proof.blind.loop.case import MOTION_KINDS
 from armlab.proof.blind.loop.counts import (
     ENDS,
     ChanceBin,
-    Share,
+    LoopShare,
     Shares,
     brier_scores,
     compare_motions,
@@ -65,7 +65,7 @@ def draw_picture(counted: Shares, bins: Sequence[ChanceBin]) -> bytes:
     return buffer.getvalue()
 
 
-def _draw_bar(axis: Axes, place: int, ends: dict[str, Share]) -> None:
+def _draw_bar(axis: Axes, place: int, ends: dict[str, LoopShare]) -> None:
     left = 0.0
     for end, share in ends.items():
         label = END_TITLES[end] if place == 0 else None

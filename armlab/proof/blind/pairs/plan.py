@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 
 from armlab.common.arrays import Array
 from armlab.proof.blind.effects.bodies import Payload
-from armlab.proof.blind.effects.channels import EncoderOffset, Gain
+from armlab.proof.blind.effects.channels import EncoderOffset, TorqueGain
 from armlab.proof.blind.effects.friction import Coulomb, Viscous
 from armlab.proof.blind.effects.hidden import HiddenEffect
 from armlab.proof.blind.formats import Tier
@@ -130,7 +130,7 @@ def draw_change(pair: PairPlan, attempt: int) -> tuple[HiddenEffect, ...]:
         link = int(rng.choice(Payload.places(machine)))
         return (replace(Payload.draw(rng, machine, link), size=PAIRS.payload_kg),)
     if pair.kind == "gain":
-        return (Gain(joint, PAIRS.gain, 0.5, "factor", {**direction, "knee": 0.0, "peak": 0.0}),)
+        return (TorqueGain(joint, PAIRS.gain, 0.5, "factor", {**direction, "knee": 0.0, "peak": 0.0}),)
     if pair.kind == "zero":
         return (EncoderOffset(joint, float(np.deg2rad(PAIRS.zero_deg)), 0.08, "constant", direction),)
     return ()

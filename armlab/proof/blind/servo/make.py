@@ -13,7 +13,7 @@ from armlab.common.settings import to_plain_data, validate
 from armlab.proof.blind.servo.arms import write_mjcf
 from armlab.proof.blind.servo.engine import ServoArm
 from armlab.proof.blind.servo.hidden import Hidden, servo_parameters
-from armlab.proof.blind.servo.oracle import Oracle, find_size, record
+from armlab.proof.blind.servo.oracle import ServoOracle, find_size, record
 from armlab.proof.blind.servo.plan import ServoCase
 from armlab.proof.blind.servo.truth import MotionTruth
 
@@ -43,7 +43,7 @@ def make_case(case: ServoCase) -> MadeCase:
     sizes: list[float] = []
     passed_over: list[str] = []
     for place, wanted in enumerate(case.multiples):
-        oracle = Oracle(case, arm)
+        oracle = ServoOracle(case, arm)
         for attempt in range(MAX_DRAWS):
             drawn = case.draw_hidden(place, attempt)
             if drawn.facts.effect in [each.facts.effect for each in hidden]:
@@ -55,7 +55,7 @@ def make_case(case: ServoCase) -> MadeCase:
                 arm = sized.apply(arm)
                 break
             passed_over.append(drawn.kind)
-    oracle = Oracle(case, arm)
+    oracle = ServoOracle(case, arm)
     multiples = tuple(oracle.multiple(each, arm, _without(case, hidden, each)) for each in hidden)
     return MadeCase(case, arm, tuple(hidden), tuple(sizes), multiples, tuple(passed_over))
 

@@ -28,7 +28,7 @@ from armlab.proof.blind.servo.plan import MotionRun, ServoCase
 
 
 @dataclass(frozen=True)
-class OracleSettings:
+class ServoOracleSettings:
     """level: over all effects and joints. step: relative, of the numbers that are free. correlated: an autocorrelation
     below it ends the sum. evaluations: of a size. near: relative error of a size that is good enough.
     """
@@ -41,7 +41,7 @@ class OracleSettings:
     near: float = 0.1
 
 
-ORACLE = OracleSettings()
+ORACLE = ServoOracleSettings()
 
 
 def replay(case: ServoCase, arm: ServoArm, run: MotionRun, smooth: bool) -> Array:
@@ -65,7 +65,7 @@ def record(case: ServoCase, arm: ServoArm, number: int) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True)
-class Oracle:
+class ServoOracle:
     """The oracle of a case. arm: whose noise and free numbers count."""
 
     case: ServoCase
@@ -147,7 +147,7 @@ def _only(joint: int, change: Array) -> Array:
     return out
 
 
-def find_size(oracle: Oracle, hidden: Hidden, wanted: float) -> tuple[Hidden, float]:
+def find_size(oracle: ServoOracle, hidden: Hidden, wanted: float) -> tuple[Hidden, float]:
     """The difference with a size of about `wanted` detection limits, and its multiple; at most the largest size."""
     tried: list[tuple[float, float]] = []  # sizes and multiples
     size = hidden.facts.largest

@@ -71,7 +71,7 @@ class HiddenOutcome:
 
 
 @dataclass(frozen=True)
-class MotionOutcome:
+class ServoOutcome:
     """One case: what is true of it, and what was said. refused: why there is no verdict."""
 
     case: str
@@ -131,7 +131,7 @@ def score_motion(work: Path, names: Sequence[str], results: Path) -> MotionScore
 def read_motion_measures(folder: Path) -> list[Measure]:
     """The measures that all tiers have, from motion.json in a folder."""
     found = read_json(folder / MOTION_FILE)
-    outcomes = TypeAdapter(list[MotionOutcome]).validate_python(found["cases"])
+    outcomes = TypeAdapter(list[ServoOutcome]).validate_python(found["cases"])
     nulls = [bool(each.wrong) for each in outcomes if each.kind == "null"]
     known = [each for each in outcomes if each.kind != "null" and each.knowledge == "known"]
     right = share_measure(
@@ -144,7 +144,7 @@ def read_motion_measures(folder: Path) -> list[Measure]:
     ]
 
 
-def _measure(outcomes: Sequence[MotionOutcome]) -> list[tuple[Share, str]]:
+def _measure(outcomes: Sequence[ServoOutcome]) -> list[tuple[Share, str]]:
     nulls = [each for each in outcomes if each.kind == "null"]
     others = [each for each in outcomes if each.kind != "null"]
     known = [own for each in others if each.knowledge == "known" for own in each.hidden if own.visible]
@@ -173,13 +173,13 @@ def _measure(outcomes: Sequence[MotionOutcome]) -> list[tuple[Share, str]]:
     ]
 
 
-def _false_claims(nulls: Sequence[MotionOutcome], knowledge: str) -> tuple[Share, str]:
+def _false_claims(nulls: Sequence[ServoOutcome], knowledge: str) -> tuple[Share, str]:
     """Of the nulls whose drives are known, partly or not."""
     own = [each for each in nulls if each.knowledge == knowledge]
     return Share(f"nulls with a false claim, drive {knowledge}", sum(bool(each.wrong) for each in own), len(own)), ""
 
 
-def _rows_of_kinds(outcomes: Sequence[MotionOutcome]) -> list[tuple[str, ...]]:
+def _rows_of_kinds(outcomes: Sequence[ServoOutcome]) -> list[tuple[str, ...]]:
     seen = [own for each in outcomes for own in each.hidden if own.visible]
     rows: list[tuple[str, ...]] = []
     for kind in sorted({own.kind for own in seen}):
@@ -189,7 +189,7 @@ def _rows_of_kinds(outcomes: Sequence[MotionOutcome]) -> list[tuple[str, ...]]:
     return rows
 
 
-def _rows_of_numbers(outcomes: Sequence[MotionOutcome]) -> list[tuple[str, ...]]:
+def _rows_of_numbers(outcomes: Sequence[ServoOutcome]) -> list[tuple[str, ...]]:
     """Each number in all cases, and in those of SHOWN_COUNTS and SHOWN_RATE_HZ."""
     shown = [each for each in outcomes if (each.counts, each.rate_hz) == (SHOWN_COUNTS, SHOWN_RATE_HZ)]
     rows: list[tuple[str, ...]] = []
@@ -204,7 +204,7 @@ def _rows_of_numbers(outcomes: Sequence[MotionOutcome]) -> list[tuple[str, ...]]
     return rows
 
 
-def _rows_of_misses(outcomes: Sequence[MotionOutcome]) -> list[tuple[str, ...]]:
+def _rows_of_misses(outcomes: Sequence[ServoOutcome]) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for each in outcomes:
         if each.wrong or each.refused or any(own.visible and not own.in_class for own in each.hidden):
@@ -214,7 +214,7 @@ def _rows_of_misses(outcomes: Sequence[MotionOutcome]) -> list[tuple[str, ...]]:
     return rows
 
 
-def _judge(work: Path, case: str) -> MotionOutcome:
+def _judge(work: Path, case: str) -> ServoOutcome:
     truth = json.loads((work / "truth" / f"{case}.json").read_text(encoding="utf-8"))
     folder = work / "verdicts" / case
     refused = read_complaint(folder)
@@ -222,14 +222,14 @@ def _judge(work: Path, case: str) -> MotionOutcome:
     return judge(truth, verdict, refused)
 
 
-def judge(truth: dict[str, Any], verdict: dict[str, Any], refused: str = "") -> MotionOutcome:
+def judge(truth: dict[str, Any], verdict: dict[str, Any], refused: str = "") -> ServoOutcome:
     """Judges a verdict (verdict/1, empty where there is none) by an answer (motion-truth/1)."""
     classes = [(finding, _class_of(finding)) for finding in verdict.get("findings", [])]
     lacking = LACKING[truth["knowledge"]]
     with_kd = {finding["joint"] for finding, _ in classes if "kd" in finding["parameters"]}
     numbers = [(finding, number) for finding, _ in classes for number in _compare(finding, truth, lacking, with_kd)]
     single = [number for finding, number in numbers if len(_class_of(finding)) == 1 and not number.held]
-    return MotionOutcome(
+    return ServoOutcome(
         case=truth["case"],
         kind=truth["kind"],
         law=truth["law"],

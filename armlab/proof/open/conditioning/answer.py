@@ -9,7 +9,7 @@ import pandas as pd
 from armlab.common.arrays import Array
 from armlab.common.statistics import adjust_by_holm, spearman_correlations
 from armlab.common.streams import named_generator
-from armlab.proof.open.conditioning.arm import WINDOW_BLOCKS, ArmStudy, ArmWindows
+from armlab.proof.open.conditioning.arm import WINDOW_BLOCKS, ArmWindows, ConditioningStudy
 from armlab.proof.open.conditioning.correlation import BlockCorrelation, average, correlate, count_of_values
 from armlab.proof.open.conditioning.criteria import CRITERIA
 
@@ -20,7 +20,7 @@ SIMULATED_RANGE = (0.025, 0.975)  # quantiles of the simulations
 Verdict = Literal["helps", "misleads", "cannot tell"]
 
 
-def correlation_table(studies: Sequence[ArmStudy]) -> pd.DataFrame:
+def correlation_table(studies: Sequence[ConditioningStudy]) -> pd.DataFrame:
     """A row for each length, arm (and the mean of arms) and criterion.
 
     Columns: blocks, window_s, arm, criterion, correlation, low, high, p, p_holm (over the arms of a length, for one
@@ -57,7 +57,7 @@ def verdict(low: float, high: float, p: float) -> Verdict:
     return "misleads" if p < SIGNIFICANCE and high < 0 else "cannot tell"
 
 
-def choice_table(studies: Sequence[ArmStudy], criteria: Sequence[str]) -> pd.DataFrame:
+def choice_table(studies: Sequence[ConditioningStudy], criteria: Sequence[str]) -> pd.DataFrame:
     """Median errors in percent: of all windows, of the tenth that each criterion prefers, and of the best tenth.
 
     whole_run: the error of the fit to the whole run. Columns beside: blocks, arm.

@@ -39,7 +39,7 @@ class ArmWindows:
 
 
 @dataclass(frozen=True, eq=False)
-class ArmStudy:
+class ConditioningStudy:
     """An arm with its windows of every length.
 
     base, columns: base parameters, and all columns that are fitted. whole_error: percent, of the fit to the whole run.
@@ -89,7 +89,7 @@ def plain_components(arm: Arm, recipe: Recipe) -> tuple[Candidate, ...]:
     return (*spring, *usual_components(arm))  # first, so that it takes the place of the offset of its joint
 
 
-def study_arm(recipe: Recipe, recording: Recording, simulations: int = SIMULATIONS) -> ArmStudy:
+def study_arm(recipe: Recipe, recording: Recording, simulations: int = SIMULATIONS) -> ConditioningStudy:
     """Identifies every window by ordinary least squares and judges it on the runs that validate.
 
     The whole run passes the filters before it is cut, so that a window has no ends of its own. Nothing is chosen or
@@ -109,7 +109,7 @@ def study_arm(recipe: Recipe, recording: Recording, simulations: int = SIMULATIO
         _study_windows(Windows(chosen), data, torques, len(structure.base), target) for chosen in WINDOW_BLOCKS
     )
     whole = float(target.percent(least_squares(data.matrix, torques))[0])
-    return ArmStudy(
+    return ConditioningStudy(
         recipe.name, cutoff, len(structure.base), structure.size, data.samples / data.rate_hz, whole, lengths
     )
 

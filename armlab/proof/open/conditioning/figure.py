@@ -14,7 +14,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from armlab.common.arrays import Array
 from armlab.common.report import palette
 from armlab.proof.open.conditioning.answer import MEAN
-from armlab.proof.open.conditioning.arm import WINDOW_BLOCKS, ArmStudy
+from armlab.proof.open.conditioning.arm import WINDOW_BLOCKS, ConditioningStudy
 from armlab.proof.open.conditioning.windows import BLOCKS
 
 SHOWN_CRITERIA = {
@@ -34,7 +34,7 @@ SIZE_INCHES = (11.0, 11.0)
 FIRST_POWER = 1e5  # the least tick that is written as a power of ten
 
 
-def conditioning_image(studies: Sequence[ArmStudy], table: pd.DataFrame) -> bytes:
+def conditioning_image(studies: Sequence[ConditioningStudy], table: pd.DataFrame) -> bytes:
     """PNG bytes of the picture, whose points are so many that an SVG would be larger; the same for the same numbers."""
     out = BytesIO()
     with matplotlib.rc_context({"font.size": 9}):
@@ -42,7 +42,7 @@ def conditioning_image(studies: Sequence[ArmStudy], table: pd.DataFrame) -> byte
     return out.getvalue()
 
 
-def draw_conditioning(studies: Sequence[ArmStudy], table: pd.DataFrame) -> Figure:
+def draw_conditioning(studies: Sequence[ConditioningStudy], table: pd.DataFrame) -> Figure:
     """Above a panel an arm, below a panel a length of the windows."""
     figure = Figure(figsize=SIZE_INCHES, layout="constrained")
     halves: Any = figure.subfigures(2, 1, height_ratios=(1, 2.6))
@@ -64,7 +64,7 @@ def draw_conditioning(studies: Sequence[ArmStudy], table: pd.DataFrame) -> Figur
     return figure
 
 
-def _draw_windows(axis: Axes, study: ArmStudy) -> None:
+def _draw_windows(axis: Axes, study: ConditioningStudy) -> None:
     """Every window of the greatest length; real errors, and those of the first simulation."""
     length = study.lengths[-1]
     cond = length.criteria["fitted_cond_si"].to_numpy()

@@ -7,7 +7,7 @@ import pandas as pd
 
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.proof.open.conditioning.answer import CHOSEN_SHARE, MEAN, SIGNIFICANCE
-from armlab.proof.open.conditioning.arm import SIMULATIONS, WINDOW_BLOCKS, ArmStudy
+from armlab.proof.open.conditioning.arm import SIMULATIONS, WINDOW_BLOCKS, ConditioningStudy
 from armlab.proof.open.conditioning.correlation import PERMUTATIONS
 from armlab.proof.open.conditioning.windows import BLOCKS
 
@@ -63,7 +63,7 @@ LINKS_TEXT = """\
 The paper's condition number is that of the links' columns alone. Friction is fitted all the same."""
 
 
-def conditioning_page(studies: Sequence[ArmStudy], table: pd.DataFrame, choices: pd.DataFrame) -> str:
+def conditioning_page(studies: Sequence[ConditioningStudy], table: pd.DataFrame, choices: pd.DataFrame) -> str:
     """The whole page; every number comes from the tables."""
     parts = [*answer_lines(table, choices), f"![Errors and rank correlations]({PICTURE_NAME})", "## What was done"]
     parts += [METHOD_TEXT, setting_table(studies)]
@@ -122,7 +122,7 @@ def _best_criterion(rows: pd.DataFrame) -> str:
     )
 
 
-def setting_table(studies: Sequence[ArmStudy]) -> str:
+def setting_table(studies: Sequence[ConditioningStudy]) -> str:
     """What is identified from what, a row an arm."""
     rows = []
     for study in studies:

@@ -7,7 +7,7 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.common.settings import suggest_name
 from armlab.proof.open.conditioning.answer import choice_table, correlation_table
-from armlab.proof.open.conditioning.arm import ArmStudy, study_arm
+from armlab.proof.open.conditioning.arm import ConditioningStudy, study_arm
 from armlab.proof.open.conditioning.figure import SHOWN_CRITERIA, conditioning_image
 from armlab.proof.open.conditioning.page import (
     CHOICES_NAME,
@@ -38,7 +38,7 @@ def study_conditioning(
             raise InputError(f"unknown arm '{name}': {suggest_name(name, ARMS)}")
     names = [name for name in ARMS if not only or name in only]
     opened = [open_public_recording(name, recordings) for name in names]
-    looks, studies = Looks(results / LOOKS_FILE), list[ArmStudy]()
+    looks, studies = Looks(results / LOOKS_FILE), list[ConditioningStudy]()
     for name, recording in zip(names, opened, strict=True):
         progress(f"{name}: windows")
         for run in recording.with_role("validate"):

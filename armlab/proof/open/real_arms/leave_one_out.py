@@ -45,7 +45,7 @@ USUAL: Change = ()
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ChosenOutcome:
     """Errors of the model of one diagnosis on the runs that took no part; None where it fitted nothing."""
 
     errors: dict[str, Percent] | None
@@ -58,7 +58,7 @@ class Outcome:
         return sum(math.log(max(each.filtered, 1e-9)) for each in self.errors.values()) / len(self.errors)
 
 
-OUTCOME_ADAPTER = TypeAdapter(Outcome)
+OUTCOME_ADAPTER = TypeAdapter(ChosenOutcome)
 
 
 @dataclass(frozen=True)
@@ -68,14 +68,14 @@ class Diagnoses:
     folder: Path
     code: str
 
-    def stored(self, recording: Recording, change: Change) -> Outcome | None:
+    def stored(self, recording: Recording, change: Change) -> ChosenOutcome | None:
         """The stored outcome; None where there is none or its file is damaged."""
         try:
             return OUTCOME_ADAPTER.validate_json(self._place(recording, change).read_bytes())
         except (FileNotFoundError, ValidationError):
             return None
 
-    def outcome(self, recording: Recording, change: Change, progress: Progress) -> Outcome:
+    def outcome(self, recording: Recording, change: Change, progress: Progress) -> ChosenOutcome:
         """The errors of the model that is found with a change, on the runs of the recording that validate."""
         found = self.stored(recording, change)
         if found is None:
@@ -89,17 +89,17 @@ class Diagnoses:
         return self.folder / f"{recording.name}-{key.hexdigest()[:20]}.json"
 
 
-def examine(recording: Recording, change: Change, progress: Progress) -> Outcome:
+def examine(recording: Recording, change: Change, progress: Progress) -> ChosenOutcome:
     """Diagnoses a recording with a change of settings and judges the model found."""
     settings = Settings()
     for name, value in change:
         settings = vary(settings, name, value)
     diagnosis = diagnose(recording, settings=settings, progress=progress)
     if diagnosis.inertial is None:
-        return Outcome(None)
+        return ChosenOutcome(None)
     model, cutoff = model_found(diagnosis), common_cutoff(recording)
     validate = recording.with_role("validate")
-    return Outcome({run.name: judged_run(run, cutoff).percent(model) for run in validate})
+    return ChosenOutcome({run.name: judged_run(run, cutoff).percent(model) for run in validate})
 
 
 def inside_identification(recording: Recording) -> Recording:
@@ -118,8 +118,8 @@ class ChosenSettings:
 
     arm: str
     change: Change
-    usual: Outcome
-    chosen: Outcome
+    usual: ChosenOutcome
+    chosen: ChosenOutcome
 
 
 def single_changes(tried: Mapping[str, tuple[float, ...]]) -> tuple[Change, ...]:
@@ -127,7 +127,7 @@ def single_changes(tried: Mapping[str, tuple[float, ...]]) -> tuple[Change, ...]
     return (USUAL, *(((name, value),) for name, values in tried.items() for value in values))
 
 
-def choose_change(outcomes: Mapping[Change, Sequence[Outcome]]) -> Change:
+def choose_change(outcomes: Mapping[Change, Sequence[ChosenOutcome]]) -> Change:
     """The change with the least mean logarithm of the error over arms; the first of equals.
 
     outcomes: of each change on the same arms, the usual settings first.
@@ -135,7 +135,7 @@ def choose_change(outcomes: Mapping[Change, Sequence[Outcome]]) -> Change:
     return min(outcomes, key=lambda change: sum(each.log_error for each in outcomes[change]))
 
 
-def joined_change(outcomes: Mapping[Change, Sequence[Outcome]]) -> Change:
+def joined_change(outcomes: Mapping[Change, Sequence[ChosenOutcome]]) -> Change:
     """The best value of every number at once, each as the single changes tell it."""
     joined: dict[str, float] = {}
     for name in {name for change in outcomes for name, _ in change}:
@@ -153,7 +153,7 @@ class LeaveOneOut:
     looks: Looks
     tried: Mapping[str, tuple[float, ...]]
 
-    def inside(self, progress: Progress) -> dict[str, dict[Change, Outcome]]:
+    def inside(self, progress: Progress) -> dict[str, dict[Change, ChosenOutcome]]:
         """Outcomes inside the identification runs of each arm: of the usual settings and of each single change."""
         changes, out = single_changes(self.tried), {}
         number, count = 0, len(changes) * len(self.recordings)
@@ -167,7 +167,7 @@ class LeaveOneOut:
             out[name] = found
         return out
 
-    def judge(self, arm: str, inside: dict[str, dict[Change, Outcome]], progress: Progress) -> ChosenSettings:
+    def judge(self, arm: str, inside: dict[str, dict[Change, ChosenOutcome]], progress: Progress) -> ChosenSettings:
         """Chooses on the other arms, then looks at the runs of this arm that validate."""
         others = [name for name in self.recordings if name != arm]
         outcomes = {change: [inside[name][change] for name in others] for change in single_changes(self.tried)}
@@ -183,7 +183,7 @@ class LeaveOneOut:
         usual = self._look(arm, USUAL, progress)
         return ChosenSettings(arm, chosen, usual, usual if chosen == USUAL else self._look(arm, chosen, progress))
 
-    def _look(self, arm: str, change: Change, progress: Progress) -> Outcome:
+    def _look(self, arm: str, change: Change, progress: Progress) -> ChosenOutcome:
         recording, heading = self.recordings[arm], f"{arm} judges: {change_in_words(change)}"
         if self.diagnoses.stored(recording, change) is None:
             for run in recording.with_role("validate"):
@@ -253,7 +253,7 @@ def errors_csv(chosen: Sequence[ChosenSettings]) -> str:
 
 def page(
     chosen: Sequence[ChosenSettings],
-    inside: Mapping[str, Mapping[Change, Outcome]],
+    inside: Mapping[str, Mapping[Change, ChosenOutcome]],
     tried: Mapping[str, tuple[float, ...]],
 ) -> str:
     """The whole page."""
@@ -300,7 +300,7 @@ def page(
     )
 
 
-def _outcome_text(outcome: Outcome) -> str:
+def _outcome_text(outcome: ChosenOutcome) -> str:
     if not outcome.errors:
         return "no model"
     return "; ".join(f"{each.recorded:.2f} / {each.filtered:.2f}" for each in outcome.errors.values())

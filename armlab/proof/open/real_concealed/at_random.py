@@ -22,7 +22,7 @@ from armlab.proof.open.real_concealed.conceal import Reference, SoughtEffect, id
 from armlab.proof.open.real_concealed.draw import DrawnCase, draw_cases
 from armlab.proof.open.real_concealed.examine import (
     OUTCOME_ADAPTER,
-    Outcome,
+    ExaminedCase,
     ReportedFinding,
     diagnose_concealed,
     open_outcomes,
@@ -80,7 +80,7 @@ class RandomStudy:
 
     name: str
     description: str
-    control: Outcome
+    control: ExaminedCase
     verdicts: tuple[DrawnVerdict, ...]
     labelled: tuple[tuple[LabelledFinding, ...], ...]
 
@@ -201,14 +201,14 @@ def judge_cases(settings: RandomCases, folder: Path, out: Path) -> Iterator[str]
     yield from (f"wrote {path}" for path in write_texts(texts, out))
 
 
-def _read_outcome(folder: Path) -> Outcome:
+def _read_outcome(folder: Path) -> ExaminedCase:
     try:
         return OUTCOME_ADAPTER.validate_json((folder / OUTCOME_FILE).read_bytes())
     except FileNotFoundError:
-        return Outcome(folder.name, (), (), (), (), (), None, 0.0, "no verdict")
+        return ExaminedCase(folder.name, (), (), (), (), (), None, 0.0, "no verdict")
 
 
-def _judge(name: str, judged: Sequence[tuple[RandomTruth, Outcome]], control: Outcome) -> RandomStudy:
+def _judge(name: str, judged: Sequence[tuple[RandomTruth, ExaminedCase]], control: ExaminedCase) -> RandomStudy:
     verdicts = tuple(
         judge_drawn(DrawnCase(truth.case, truth.strength), outcome, truth.sought, control, truth.joints)
         for truth, outcome in judged

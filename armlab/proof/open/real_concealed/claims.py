@@ -7,7 +7,7 @@ from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import EFFECT_IDS, effect_named
 from armlab.proof.open.real_concealed.conceal import SoughtEffect
 from armlab.proof.open.real_concealed.draw import DrawnCase
-from armlab.proof.open.real_concealed.examine import Outcome, ReportedFinding
+from armlab.proof.open.real_concealed.examine import ExaminedCase, ReportedFinding
 from armlab.proof.open.real_concealed.judge import Findings, Judge, is_same_kind
 
 ClaimVerdict = Literal["right", "class", "law", "unknown", "wrong"]
@@ -50,13 +50,13 @@ class DrawnVerdict:
     """A random case with its new claims and what was sought."""
 
     drawn: DrawnCase
-    outcome: Outcome
+    outcome: ExaminedCase
     claims: tuple[JudgedClaim, ...]
     parts: tuple[AnsweredPart, ...]
 
 
 def judge_drawn(
-    drawn: DrawnCase, outcome: Outcome, wanted: tuple[SoughtEffect, ...], control: Outcome, joints: int
+    drawn: DrawnCase, outcome: ExaminedCase, wanted: tuple[SoughtEffect, ...], control: ExaminedCase, joints: int
 ) -> DrawnVerdict:
     """Judges a case. wanted: what is concealed. joints: of the arm."""
     judge = Judge(control, joints)

@@ -51,7 +51,7 @@ class ParameterSize:
 
 
 @dataclass(frozen=True)
-class Rival:
+class RivalName:
     """A name that fits these data as well."""
 
     effect: str
@@ -78,13 +78,13 @@ class ReportedFinding:
     joints: tuple[int, ...]
     equation: str
     sizes: tuple[ParameterSize, ...]
-    rivals: tuple[Rival, ...]
+    rivals: tuple[RivalName, ...]
     probability: float | None = None
     members: tuple[PossibleName, ...] = ()
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ExaminedCase:
     """The outcome of one case: findings, and the RMS of each joint in N m (N), on the runs that took no part.
 
     given: of the error of the simulation that was handed over. found: of the error with the model found, in which
@@ -116,7 +116,7 @@ def summarise_claim(claim: Claim) -> ReportedFinding:
         span = each.interval
         pair = (float(span[0]), float(span[1])) if span and not isinstance(span[0], tuple) else None
         sizes.append(ParameterSize(each.name, float(each.value), pair, each.unit))
-    rivals = tuple(Rival(each.effect, joints_of(each.joint, each.joints)) for each in claim.rivals)
+    rivals = tuple(RivalName(each.effect, joints_of(each.joint, each.joints)) for each in claim.rivals)
     members = tuple(
         PossibleName(each.effect, joints_of(each.joint, each.joints), each.probability) for each in claim.members
     )
@@ -128,7 +128,7 @@ def summarise_mistake(found: SetupFinding) -> ReportedFinding:
     """A mistake of reading: a delay that is corrected there is no claim of physics any more."""
     own = found.mistake
     place = own.joints if own.joint is None else (own.joint,)
-    rivals = tuple(Rival(each.effect, joints_of(each.joint, each.joints)) for each in found.rivals)
+    rivals = tuple(RivalName(each.effect, joints_of(each.joint, each.joints)) for each in found.rivals)
     own_name = PossibleName(own.effect, place, found.probability)
     others = (PossibleName(each.effect, joints_of(each.joint, each.joints), each.probability) for each in found.rivals)
     sizes = tuple(
@@ -147,7 +147,7 @@ def joints_of(joint: int | None, joints: tuple[int, ...]) -> tuple[int, ...]:
 
 def examine_stored(
     reference: Reference, case: Case, stored: "OutcomeStore", looks: Looks, progress: Callable[[str], None]
-) -> Outcome:
+) -> ExaminedCase:
     """The stored outcome of a case, or a new one, whose looks at validation runs are logged first."""
     outcome = stored.read(case, reference.recording)
     if outcome is None:
@@ -159,7 +159,7 @@ def examine_stored(
     return outcome
 
 
-def examine_case(reference: Reference, case: Case, path: Path, progress: Callable[[str], None]) -> Outcome:
+def examine_case(reference: Reference, case: Case, path: Path, progress: Callable[[str], None]) -> ExaminedCase:
     """The outcome of a case. path: where the simulation that is handed over is written."""
     seen, added = conceal_case(reference, case, path)
     diagnosis, outcome = diagnose_concealed(seen, case.recording, progress)
@@ -186,7 +186,7 @@ def conceal_case(reference: Reference, case: Case, path: Path) -> tuple[Recordin
     return replace(recording, runs=runs, simulation=path), added
 
 
-def diagnose_concealed(seen: Recording, source: str, progress: Callable[[str], None]) -> tuple[Diagnosis, Outcome]:
+def diagnose_concealed(seen: Recording, source: str, progress: Callable[[str], None]) -> tuple[Diagnosis, ExaminedCase]:
     """The diagnosis of a recording with something concealed, and what it says; nothing is measured yet.
 
     source: name of the public recording, about which the weights of names know nothing.
@@ -196,7 +196,7 @@ def diagnose_concealed(seen: Recording, source: str, progress: Callable[[str], N
     findings += tuple(summarise_claim(each) for each in diagnosis.claims)
     refused = diagnosis.observed is None or diagnosis.final is None
     said = (diagnosis.reason, ()) if refused else ("", diagnosis.weighed)
-    return diagnosis, Outcome(seen.name, findings, (), (), (), (), None, diagnosis.seconds, *said)
+    return diagnosis, ExaminedCase(seen.name, findings, (), (), (), (), None, diagnosis.seconds, *said)
 
 
 def sought_in_case(reference: Reference, case: Case) -> tuple[SoughtEffect, ...]:
@@ -227,8 +227,8 @@ def _read_at(time: Array, torque: Array, wanted: Array) -> Array:
 
 
 def _measure_outcome(
-    outcome: Outcome, diagnosis: Diagnosis, hidden: Array, wanted: tuple[SoughtEffect, ...]
-) -> Outcome:
+    outcome: ExaminedCase, diagnosis: Diagnosis, hidden: Array, wanted: tuple[SoughtEffect, ...]
+) -> ExaminedCase:
     """The outcome with its errors. hidden: torque of what is concealed at the kept rows, (rows, joints)."""
     assert diagnosis.observed is not None
     assert diagnosis.nominal is not None
@@ -256,7 +256,7 @@ def _rms(values: Array) -> tuple[float, ...]:
     return tuple(np.sqrt(np.mean(values**2, axis=0)).tolist())
 
 
-OUTCOME_ADAPTER = TypeAdapter(Outcome)
+OUTCOME_ADAPTER = TypeAdapter(ExaminedCase)
 
 
 @dataclass(frozen=True)
@@ -271,14 +271,14 @@ class OutcomeStore:
         key = hashlib.sha256(f"{self.code} {case!r} {recording_digest(recording)}".encode())
         return self.folder / f"{case.recording}-{key.hexdigest()[:20]}.json"
 
-    def read(self, case: Case, recording: Recording) -> Outcome | None:
+    def read(self, case: Case, recording: Recording) -> ExaminedCase | None:
         """The stored outcome; None where there is none or its file is damaged."""
         try:
             return OUTCOME_ADAPTER.validate_json(self.place(case, recording).read_bytes())
         except (FileNotFoundError, ValidationError):
             return None
 
-    def write(self, case: Case, recording: Recording, outcome: Outcome) -> None:
+    def write(self, case: Case, recording: Recording, outcome: ExaminedCase) -> None:
         """Keeps an outcome."""
         self.folder.mkdir(parents=True, exist_ok=True)
         self.place(case, recording).write_bytes(OUTCOME_ADAPTER.dump_json(outcome))

@@ -12,7 +12,7 @@ from armlab.proof.open.real_concealed.conceal import (
     KnownNumber,
     SoughtEffect,
 )
-from armlab.proof.open.real_concealed.examine import Outcome, ParameterSize, ReportedFinding, Span
+from armlab.proof.open.real_concealed.examine import ExaminedCase, ParameterSize, ReportedFinding, Span
 from armlab.proof.open.real_concealed.plan import Case
 
 Answer = Literal["named", "identical", "law", "class", "cancelled", "elsewhere", "missed"]
@@ -61,7 +61,7 @@ class CaseVerdict:
     """
 
     case: Case
-    outcome: Outcome
+    outcome: ExaminedCase
     parts: tuple[JudgedPart, ...]
     others: tuple[ReportedFinding, ...]
     laws: tuple[ReportedFinding, ...]
@@ -70,7 +70,9 @@ class CaseVerdict:
     gap: float | None
 
 
-def judge_case(case: Case, outcome: Outcome, wanted: tuple[SoughtEffect, ...], control: Outcome) -> CaseVerdict:
+def judge_case(
+    case: Case, outcome: ExaminedCase, wanted: tuple[SoughtEffect, ...], control: ExaminedCase
+) -> CaseVerdict:
     """Judges a case. wanted: what should be named. control: the outcome with nothing concealed.
 
     Raises InputError where the diagnosis refused the case or the control.
@@ -97,7 +99,7 @@ def judge_case(case: Case, outcome: Outcome, wanted: tuple[SoughtEffect, ...], c
 class Judge:
     """What a finding means beside the control. joints: of the arm."""
 
-    control: Outcome
+    control: ExaminedCase
     joints: int
 
     def common_key(self, effect: str, joints: tuple[int, ...]) -> tuple[str, tuple[int, ...]]:

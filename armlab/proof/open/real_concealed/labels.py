@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from armlab.diagnosis.result import WeighedName
 from armlab.proof.open.real_concealed.conceal import SoughtEffect
-from armlab.proof.open.real_concealed.examine import Outcome, ReportedFinding, joints_of
+from armlab.proof.open.real_concealed.examine import ExaminedCase, ReportedFinding, joints_of
 from armlab.proof.open.real_concealed.judge import Judge, is_same_kind
 
 
@@ -23,7 +23,7 @@ class LabelledFinding:
 
 
 def label_weighed(
-    outcome: Outcome, wanted: tuple[SoughtEffect, ...], control: Outcome, joints: int
+    outcome: ExaminedCase, wanted: tuple[SoughtEffect, ...], control: ExaminedCase, joints: int
 ) -> Iterator[LabelledFinding]:
     """Each finding of a case. wanted: what is concealed. joints: of the arm.
 

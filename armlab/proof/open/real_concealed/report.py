@@ -20,7 +20,7 @@ from armlab.common.report.wording import format_number, format_unit
 from armlab.common.settings import suggest_name
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import EFFECT_IDS, effect_named
-from armlab.proof.open.real_concealed.examine import Outcome, ReportedFinding, open_outcomes
+from armlab.proof.open.real_concealed.examine import ExaminedCase, ReportedFinding, open_outcomes
 from armlab.proof.open.real_concealed.judge import Answer, CaseVerdict, ComparedNumber, JudgedPart
 from armlab.proof.open.real_concealed.plan import INJECTED
 from armlab.proof.open.real_concealed.study import ConcealedStudy, study_recording
@@ -74,7 +74,7 @@ def _size_in_words(number: ComparedNumber) -> str:
     return f"{number.size.name} {known} → {own} {format_unit(number.size.unit)}".rstrip() + fits
 
 
-def format_percent(outcome: Outcome, errors: Sequence[float]) -> str:
+def format_percent(outcome: ExaminedCase, errors: Sequence[float]) -> str:
     """Of the measured torque, over all joints."""
     return f"{100 * math.hypot(*errors) / math.hypot(*outcome.torque):.1f} %"
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from armlab.proof.open.real_concealed.conceal import Reference, identify_reference
-from armlab.proof.open.real_concealed.examine import Outcome, OutcomeStore, examine_stored, sought_in_case
+from armlab.proof.open.real_concealed.examine import ExaminedCase, OutcomeStore, examine_stored, sought_in_case
 from armlab.proof.open.real_concealed.judge import CaseVerdict, judge_case
 from armlab.proof.open.real_concealed.plan import Case, cases_of
 from armlab.proof.open.real_identification.looks import Looks
@@ -22,7 +22,7 @@ class ConcealedStudy:
     """control: the outcome with nothing concealed. verdicts: of every case with something concealed."""
 
     reference: Reference
-    control: Outcome
+    control: ExaminedCase
     verdicts: tuple[CaseVerdict, ...]
 
     @property

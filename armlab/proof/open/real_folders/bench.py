@@ -16,7 +16,7 @@ from armlab.proof.open.real_folders.consistency import contradictions
 from armlab.proof.open.real_folders.errors import FolderErrors, measure_errors
 from armlab.proof.open.real_folders.facts import FactsFile, PairFacts, SingleFacts, read_facts
 from armlab.proof.open.real_folders.folders import RecordingFolder, check_facts, choose_folders, find_folders
-from armlab.proof.open.real_folders.runs import FolderRun, Outcome, plan_runs, run_missing
+from armlab.proof.open.real_folders.runs import FolderOutcome, FolderRun, plan_runs, run_missing
 from armlab.proof.open.real_folders.score import FolderScore, score_missing, score_pair, score_single
 from armlab.proof.open.real_folders.table import FolderRow, table_texts, total_lines
 from armlab.proof.open.real_folders.told import ToldVerdict, read_told
@@ -87,7 +87,7 @@ def _measure(run: FolderRun, known: SingleFacts | PairFacts | None) -> FolderErr
 
 
 def _row(run: FolderRun, errors: FolderErrors, facts: FactsFile | None) -> FolderRow:
-    outcome = run.outcome() or Outcome(0.0, 0.0, 0.0, "stopped before its end")
+    outcome = run.outcome() or FolderOutcome(0.0, 0.0, 0.0, "stopped before its end")
     verdict = None
     try:
         verdict = read_told(run.verdict_file) if run.verdict_file.is_file() else None

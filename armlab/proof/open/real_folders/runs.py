@@ -27,7 +27,7 @@ STOPPED = 130  # exit status of a command that Ctrl-C ends
 
 
 @dataclass(frozen=True)
-class Outcome:
+class FolderOutcome:
     """What a diagnosis took. processor_seconds: of all its threads. failure: the error in one line, None for none."""
 
     seconds: float
@@ -53,10 +53,10 @@ class FolderRun:
         """The verdict or the comparison."""
         return self.verdict_folder / self.folder.verdict_name
 
-    def outcome(self) -> Outcome | None:
+    def outcome(self) -> FolderOutcome | None:
         """What it took; None where it is not done."""
         path = self.work / OUTCOME_FILE
-        return Outcome(**read_json(path)) if path.is_file() else None
+        return FolderOutcome(**read_json(path)) if path.is_file() else None
 
 
 def plan_runs(folders: Sequence[RecordingFolder], work: Path) -> tuple[FolderRun, ...]:
@@ -99,13 +99,13 @@ def run_missing(runs: Sequence[FolderRun], jobs: int) -> Iterator[str]:
         yield f"{said} {number} of {len(missing)}: {run.folder.name}, {outcome.seconds:.0f} s{left}"
 
 
-def _run(run: FolderRun) -> tuple[FolderRun, Outcome]:
+def _run(run: FolderRun) -> tuple[FolderRun, FolderOutcome]:
     """The command line in a process of its own, with one thread for linear algebra."""
     shutil.rmtree(run.work, ignore_errors=True)
     run.work.mkdir(parents=True)
     command = [*COMMAND, *run.folder.arguments(), "--out", str(run.verdict_folder.resolve())]
     measured = measure_run(command, REPOSITORY)
-    outcome = Outcome(
+    outcome = FolderOutcome(
         seconds=round(measured.seconds, 2),
         processor_seconds=round(measured.processor_seconds, 2),
         memory_mb=round(measured.memory_bytes / (1 << 20), 1),

@@ -16,10 +16,10 @@ from armlab.proof.open.real_folders.facts import (
 from armlab.proof.open.real_folders.told import (
     FACT_RANKS,
     SETUP,
+    FindingAsTold,
     Rank,
-    Statement,
+    StatedFact,
     ToldChange,
-    ToldFinding,
     ToldVerdict,
     friction_at,
     number_of,
@@ -103,7 +103,9 @@ class _SingleJudge:
             told=len(shown),
         )
 
-    def _best(self, fact: KnownFact, told: Sequence[tuple[ToldFinding, Statement]]) -> tuple[Rank, ToldFinding | None]:
+    def _best(
+        self, fact: KnownFact, told: Sequence[tuple[FindingAsTold, StatedFact]]
+    ) -> tuple[Rank, FindingAsTold | None]:
         """The best rank of a fact, and the finding that tells it; a class may hold no name that is not right."""
         effects = self.file.effects(fact.effect)
         fitting = [
@@ -114,11 +116,11 @@ class _SingleJudge:
             and finding.effect in effects
             and said.names <= effects | BESIDE_ANY
         ]
-        missed: tuple[Rank, ToldFinding | None] = ("missed", None)
+        missed: tuple[Rank, FindingAsTold | None] = ("missed", None)
         return min(fitting, key=lambda each: FACT_RANKS.index(each[0]), default=missed)
 
     def _wrong_about(
-        self, fact: KnownFact, rank: Rank, by: ToldFinding | None, told: Sequence[tuple[ToldFinding, Statement]]
+        self, fact: KnownFact, rank: Rank, by: FindingAsTold | None, told: Sequence[tuple[FindingAsTold, StatedFact]]
     ) -> Iterator[str]:
         """A strong fact that is not told, a number or a friction torque outside of what is known."""
         label = f"{'/'.join(fact.effect)}@{fact.joint}"
@@ -137,7 +139,7 @@ class _SingleJudge:
             if torque is not None and not fact.torque[0] <= torque <= fact.torque[1]:
                 yield f"{label} {torque:.3g} at {fact.speed:g}, known {_range_text(fact.torque)}"
 
-    def _wrong_in(self, finding: ToldFinding, said: Statement) -> Iterator[str]:
+    def _wrong_in(self, finding: FindingAsTold, said: StatedFact) -> Iterator[str]:
         """A finding that contradicts a fact, or whose number lies outside of what is allowed."""
         if said.rank in ("minor", "below"):
             return
@@ -148,13 +150,13 @@ class _SingleJudge:
             if allowed.value is not None and number is not None and not _touches(number, allowed.value):
                 yield f"{finding.label} {_interval_text(number)}, known {_range_text(allowed.value)}"
 
-    def _is_extra(self, finding: ToldFinding, said: Statement) -> bool:
+    def _is_extra(self, finding: FindingAsTold, said: StatedFact) -> bool:
         if said.rank in ("minor", "below") or said.names & set(self.known.never):
             return False
         right: list[KnownFact | AllowedFact] = [*self.known.known, *self.known.allowed]
         return not any(self._covers(each, finding) for each in right)
 
-    def _covers(self, fact: KnownFact | AllowedFact, finding: ToldFinding) -> bool:
+    def _covers(self, fact: KnownFact | AllowedFact, finding: FindingAsTold) -> bool:
         """Whether a finding is of an effect and at a place that a fact names."""
         joints = fact.joints if isinstance(fact, AllowedFact) else None if fact.joint is None else (fact.joint,)
         return finding.effect in self.file.effects(fact.effect) and (
@@ -172,7 +174,7 @@ class _SingleJudge:
             yield "inconclusive"
 
 
-def _is_fair(finding: ToldFinding, fact: ReadingFact) -> bool:
+def _is_fair(finding: FindingAsTold, fact: ReadingFact) -> bool:
     if finding.effect != fact.effect:
         return False
     joints, number = finding.places - {None}, number_of(finding)
@@ -221,7 +223,7 @@ def _best_rank(ranks: list[Rank]) -> Rank:
     return min([*ranks, "missed"], key=FACT_RANKS.index)
 
 
-def _covers_change(fact: ChangedFact | AllowedFact, finding: ToldFinding, file: FactsFile) -> bool:
+def _covers_change(fact: ChangedFact | AllowedFact, finding: FindingAsTold, file: FactsFile) -> bool:
     joints = fact.joints if isinstance(fact, AllowedFact) else (fact.joint,)
     somewhere = joints is None or not finding.places.isdisjoint({*joints, None})
     return finding.effect in file.effects(fact.effect) and somewhere

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.proof.open.real_folders.errors import MODELS, FolderErrors, JointErrors, Ratio
 from armlab.proof.open.real_folders.folders import RecordingFolder
-from armlab.proof.open.real_folders.runs import Outcome
+from armlab.proof.open.real_folders.runs import FolderOutcome
 from armlab.proof.open.real_folders.score import FolderScore
 from armlab.proof.open.real_folders.told import FACT_RANKS, ToldVerdict
 
@@ -58,7 +58,7 @@ class FolderRow:
 
     folder: RecordingFolder
     licensed: bool
-    outcome: Outcome
+    outcome: FolderOutcome
     verdict: ToldVerdict | None
     score: FolderScore | None
     errors: FolderErrors

@@ -28,7 +28,7 @@ USUAL_NUMBER = "level"
 SETUP = "setup"
 
 
-class ToldFinding(Entry):
+class FindingAsTold(Entry):
     """A finding as far as it is judged. minor: found, and not told. kind: `setup` for a reading mistake."""
 
     effect: str
@@ -77,12 +77,12 @@ class ToldVerdict(Entry):
 
     status: str
     summary: str = ""
-    findings: tuple[ToldFinding, ...] | None = None
+    findings: tuple[FindingAsTold, ...] | None = None
     friction: tuple[FrictionRow, ...] | None = None
     changes: tuple[ToldChange, ...] | None = None
 
     @property
-    def found(self) -> tuple[ToldFinding, ...]:
+    def found(self) -> tuple[FindingAsTold, ...]:
         """The findings; none where the file has no such list."""
         return self.findings or ()
 
@@ -92,36 +92,36 @@ def read_told(path: Path) -> ToldVerdict:
     return validate(ToldVerdict, read_json(path), str(path))
 
 
-class Statement(Entry):
+class StatedFact(Entry):
     """How a finding is told, and by which names together."""
 
     rank: Rank
     names: frozenset[str]
 
 
-def statement_of(finding: ToldFinding, friction: Set[str]) -> Statement:
+def statement_of(finding: FindingAsTold, friction: Set[str]) -> StatedFact:
     """By its probability (none given: 1): a name, the fewest of its names that reach 0.9 together, or a cause.
 
     friction: effects whose laws count together for a cause. `below` is too improbable to be told at all.
     """
     own = frozenset({finding.effect})
     if finding.minor:
-        return Statement(rank="minor", names=own)
+        return StatedFact(rank="minor", names=own)
     probability = 1.0 if finding.probability is None else finding.probability
     if probability >= MIN_NAME_PROBABILITY:
-        return Statement(rank="named", names=own)
+        return StatedFact(rank="named", names=own)
     members = [each for each in finding.class_ or () if each.effect != "unknown" and each.joint in finding.places]
     names, total = set[str](), 0.0
     for member in sorted(members, key=lambda each: -each.probability)[:MAX_CLASS_NAMES]:
         names.add(member.effect)
         total += member.probability
         if total >= MIN_NAME_PROBABILITY:
-            return Statement(rank="class" if finding.effect in names else "below", names=frozenset(names))
+            return StatedFact(rank="class" if finding.effect in names else "below", names=frozenset(names))
     laws = sum(each.probability for each in members if each.effect in friction) if finding.effect in friction else 0.0
-    return Statement(rank="cause" if max(probability, laws) >= MIN_CAUSE_PROBABILITY else "below", names=own)
+    return StatedFact(rank="cause" if max(probability, laws) >= MIN_CAUSE_PROBABILITY else "below", names=own)
 
 
-def number_of(finding: ToldFinding, name: str | None = None) -> tuple[float, float] | None:
+def number_of(finding: FindingAsTold, name: str | None = None) -> tuple[float, float] | None:
     """The interval of a finding's main number, or of the one of that name, signs dropped; None where it has none."""
     parameter = finding.parameters.get(name or MAIN_NUMBER.get(finding.effect, USUAL_NUMBER))
     if parameter is None or not isinstance(parameter.value, float | int):
@@ -139,7 +139,7 @@ def _scalars(parameter: ParameterEntry) -> tuple[float, float]:
 
 
 def friction_at(
-    verdict: ToldVerdict, told: tuple[ToldFinding, ...], joint: int, speed: float, friction: Set[str]
+    verdict: ToldVerdict, told: tuple[FindingAsTold, ...], joint: int, speed: float, friction: Set[str]
 ) -> float | None:
     """All told friction of a joint at a speed, N m (N); None where nothing is told or a law has no value there.
 
@@ -160,7 +160,7 @@ def _last_line(row: FrictionRow, speed: float) -> float:
     return low + (high - low) * (speed - first) / (last - first) if last > first else high
 
 
-def _friction_of(finding: ToldFinding, speed: float) -> float | None:
+def _friction_of(finding: FindingAsTold, speed: float) -> float | None:
     """Torque of one law at a speed: the mean of both directions, a power of the speed, or a level."""
     directions = [size for name in ("positive", "negative") for size in [_size(finding, name)] if size is not None]
     if directions:
@@ -172,7 +172,7 @@ def _friction_of(finding: ToldFinding, speed: float) -> float | None:
     return _size(finding, "level")
 
 
-def _size(finding: ToldFinding, name: str) -> float | None:
+def _size(finding: FindingAsTold, name: str) -> float | None:
     parameter = finding.parameters.get(name)
     if parameter is None or not isinstance(parameter.value, float | int):
         return None

@@ -13,7 +13,7 @@ from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.report.wording import join_words
 from armlab.common.statistics import wilson_interval
-from armlab.proof.open.relations.relations import NULL_PAIRS, RELATIONS, Desk, Outcome, check_relation
+from armlab.proof.open.relations.relations import NULL_PAIRS, RELATIONS, Desk, RelationOutcome, check_relation
 from armlab.proof.open.stored import code_digest, recording_digest
 from armlab.recordings.load import load_recording
 from armlab.recordings.public import PUBLIC_RECORDINGS, is_available, open_public_recording
@@ -38,7 +38,7 @@ def bench_relations(
     further recordings. only: names of the recordings that are taken. names: of the relations.
     """
     stored = _read(results / STORE)
-    outcomes: list[Outcome] = []
+    outcomes: list[RelationOutcome] = []
     for recording in _at_hand(recordings, folders, only):
         desk = Desk()
         for name in names:
@@ -70,20 +70,20 @@ def _key(recording: Recording, name: str) -> str:
     return hashlib.sha256(whole.encode()).hexdigest()
 
 
-def _read(path: Path) -> dict[str, Outcome]:
+def _read(path: Path) -> dict[str, RelationOutcome]:
     if not path.is_file():
         return {}
     rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line]
-    return {row["key"]: Outcome(row["recording"], row["relation"], row["holds"], row["detail"]) for row in rows}
+    return {row["key"]: RelationOutcome(row["recording"], row["relation"], row["holds"], row["detail"]) for row in rows}
 
 
-def _append(path: Path, key: str, outcome: Outcome) -> None:
+def _append(path: Path, key: str, outcome: RelationOutcome) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps({"key": key, **asdict(outcome)}) + "\n")
 
 
-def relations_page(outcomes: Sequence[Outcome]) -> str:
+def relations_page(outcomes: Sequence[RelationOutcome]) -> str:
     """A table of relations by recordings, then what is broken and why."""
     recordings = list(dict.fromkeys(each.recording for each in outcomes))
     relations = list(dict.fromkeys(each.relation for each in outcomes))
@@ -101,7 +101,7 @@ def relations_page(outcomes: Sequence[Outcome]) -> str:
     return markdown_page("Relations", intro, *parts, markdown_table(("recording", "relation", "", "why"), details))
 
 
-def count_null_pairs(outcomes: Sequence[Outcome]) -> str:
+def count_null_pairs(outcomes: Sequence[RelationOutcome]) -> str:
     """How often a change is named between stretches of one recording that are independent of each other."""
     answered = [each for each in outcomes if each.relation in NULL_PAIRS and each.holds is not None]
     if not answered:

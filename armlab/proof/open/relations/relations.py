@@ -38,7 +38,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RelationOutcome:
     """holds: None where the recording allows no answer. detail: numbers, or what broke."""
 
     recording: str
@@ -271,10 +271,10 @@ QUICK = (
 )
 
 
-def check_relation(name: str, recording: Recording, desk: Desk) -> Outcome:
+def check_relation(name: str, recording: Recording, desk: Desk) -> RelationOutcome:
     """The outcome of one relation on a recording."""
     holds, detail = RELATIONS[name](recording, desk)
-    return Outcome(recording.name, name, holds, detail)
+    return RelationOutcome(recording.name, name, holds, detail)
 
 
 def _names(found: Diagnosis) -> list[str]:
