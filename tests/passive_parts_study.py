@@ -198,27 +198,54 @@ def judge(cases: list[Case]) -> list[str]:
     return lines
 
 
+def read_cases(path: Path) -> list[Case]:
+    """The cases of a CSV file, none where it does not exist."""
+    if not path.is_file():
+        return []
+    with path.open(newline="", encoding="utf-8") as file:
+        return [
+            Case(
+                number=int(row["number"]),
+                passive=row["passive"] == "True",
+                hidden=int(row["hidden"]) if row["hidden"] else None,
+                size=float(row["size"]),
+                findings=row["findings"],
+                status=row["status"],
+            )
+            for row in csv.DictReader(file)
+        ]
+
+
+def append_case(path: Path, case: Case) -> None:
+    """Adds a row at once, so that a study that is interrupted goes on where it was."""
+    is_new = not path.is_file()
+    with path.open("a", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(asdict(case)))
+        if is_new:
+            writer.writeheader()
+        writer.writerow(asdict(case))
+
+
 def main() -> None:
     """Makes, diagnoses and judges as many recordings as are asked."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--nothing-missing", type=int, default=10, help="recordings in which nothing is missing")
     parser.add_argument("--hidden", type=int, default=0, help="recordings with hidden friction, with and without parts")
     parser.add_argument("--first", type=int, default=0, help="number of the first arm, to share the work")
-    parser.add_argument("--out", type=Path, help="CSV file with a row for each recording")
+    parser.add_argument("--out", type=Path, help="CSV file with a row for each recording; rows that it has are kept")
     options = parser.parse_args()
     numbers = range(options.first, options.first + options.nothing_missing)
     asked = [(number, True, False) for number in numbers]
     hidden = range(options.first, options.first + options.hidden)
     asked += [(number, passive, True) for number in hidden for passive in (True, False)]
-    cases = []
+    cases = read_cases(options.out) if options.out else []
+    made = {(case.number, case.passive, case.hidden is not None) for case in cases}
     for each in asked:
-        cases.append(run_case(*each))
-        print(cases[-1], flush=True)
-    if options.out:
-        with options.out.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(asdict(cases[0])))
-            writer.writeheader()
-            writer.writerows(map(asdict, cases))
+        if each not in made:
+            cases.append(run_case(*each))
+            print(cases[-1], flush=True)
+            if options.out:
+                append_case(options.out, cases[-1])
     print("\n".join(judge(cases)))
 
 
