@@ -6,8 +6,11 @@ is `before @ motion(q) @ after`. Standard D-H (motion first, then a and alpha), 
 first) and URDF (an origin and any axis) are three ways to write this.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from functools import cached_property
+from operator import itemgetter
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -15,6 +18,7 @@ from armlab.common.arrays import Array
 from problem.transforms import rotation_z, translation
 
 PARAMETER_NAMES = ("m", "mcx", "mcy", "mcz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")  # eq. 31
+_T = TypeVar("_T")
 PARAMETER_UNITS = ("kg", *("kg.m",) * 3, *("kg.m2",) * 6)
 
 
@@ -82,13 +86,37 @@ class JointLaw:
     drive_compensates: bool = False
 
 
+NO_BODY = Link(0.0, (0.0,) * 3, (0.0,) * 6)
+
+
+@dataclass(frozen=True, eq=False)
+class CoupledJoint:
+    """A joint whose position is a straight line over that of one of the arm's own joints, its leader.
+
+    position = multiplier q_leader + offset. behind: how many own joints lie before it; leader: the place of that joint
+    among them, from 0. link, law, rotor_inertia, compensated: its own, as in `Arm`; its law and its rotor count in
+    those of the leader, too.
+    """
+
+    joint: Joint
+    behind: int
+    leader: int
+    multiplier: float
+    offset: float
+    link: Link = NO_BODY
+    law: JointLaw = JointLaw()
+    rotor_inertia: float = 0.0
+    compensated: Link = NO_BODY
+
+
 @dataclass(frozen=True, eq=False)
 class Arm:
     """A serial arm; `links` is None where its inertial parameters are unknown.
 
     gravity: (3,), m/s2, in the base frame. rotor_inertia: one a joint, kg m2 (kg) on the joint side. joint_laws: what
     the file of a simulator says of each joint; empty where it says nothing. compensated: of each link the masses whose
-    weight the simulator carries; empty where it carries none.
+    weight the simulator carries; empty where it carries none. coupled: joints of the chain that others lead, from the
+    base on; they are none of `joints`, and their links none of `links` (see `coupled_joints`).
     """
 
     name: str
@@ -98,6 +126,7 @@ class Arm:
     rotor_inertia: tuple[float, ...] = ()
     joint_laws: tuple[JointLaw, ...] = ()
     compensated: tuple[Link, ...] = ()
+    coupled: tuple[CoupledJoint, ...] = ()
 
     def __repr__(self) -> str:
         """Joints, what is known of the links, and how many joints have limits."""
@@ -138,11 +167,57 @@ class Arm:
             rotor_inertia=self.rotor_inertia[:joints],
             joint_laws=self.joint_laws[:joints],
             compensated=self.compensated[:joints],
+            coupled=tuple(each for each in self.coupled if each.behind <= joints),
+        )
+
+    @cached_property
+    def chain_places(self) -> tuple[int, ...]:
+        """Places of the own joints in the chain of all joints, from 0."""
+        behind = [sum(each.behind <= joint for each in self.coupled) for joint in range(len(self))]
+        return tuple(joint + before for joint, before in enumerate(behind))
+
+    @cached_property
+    def coupling(self) -> tuple[Array, Array]:
+        """Matrix (chain, joints) and offsets (chain,) that make positions of all joints of those of the own ones."""
+        matrix = np.zeros((len(self) + len(self.coupled), len(self)))
+        offsets = np.zeros(len(matrix))
+        matrix[list(self.chain_places), np.arange(len(self))] = 1.0
+        for place, each in zip(self._coupled_places, self.coupled, strict=True):
+            matrix[place, each.leader], offsets[place] = each.multiplier, each.offset
+        return matrix, offsets
+
+    @property
+    def _coupled_places(self) -> list[int]:
+        return [each.behind + number for number, each in enumerate(self.coupled)]
+
+    @cached_property
+    def chain(self) -> "Arm":
+        """The arm of all joints of the chain, as if nothing coupled them; laws and rotors of leaders count twice."""
+        if not self.coupled:
+            return self
+
+        def whole(own: Sequence[_T], coupled: Sequence[_T]) -> tuple[_T, ...]:
+            places = [*self.chain_places, *self._coupled_places]
+            return tuple(value for _, value in sorted(zip(places, [*own, *coupled], strict=True), key=itemgetter(0)))
+
+        count = len(self)
+        return Arm(
+            self.name,
+            whole(self.joints, [each.joint for each in self.coupled]),
+            whole(self.links or (NO_BODY,) * count, [each.link for each in self.coupled]),
+            self.gravity,
+            whole(self.rotor_inertia or (0.0,) * count, [each.rotor_inertia for each in self.coupled]),
+            whole(self.joint_laws or (JointLaw(),) * count, [each.law for each in self.coupled]),
+            whole(self.compensated or (NO_BODY,) * count, [each.compensated for each in self.coupled]),
         )
 
 
 def link_poses(arm: Arm, positions: Array) -> list[Array]:
     """Pose (4, 4) of each link in the base frame at joint positions (joints,), rad or m."""
+    if arm.coupled:
+        matrix, offsets = arm.coupling
+        of_chain = link_poses(arm.chain, matrix @ positions + offsets)
+        return [of_chain[place] for place in arm.chain_places]
     poses, pose = [], np.eye(4)
     for joint, position in zip(arm.joints, positions, strict=True):
         pose = pose @ joint.pose(float(position))
@@ -156,6 +231,9 @@ def body_points(arm: Arm, positions: Array, tool: Array) -> Array:
     positions: (..., joints), rad or m; tool: (3,) in the last link's frame, m.
     Returns (..., joints + 1, 3), m.
     """
+    if arm.coupled:
+        matrix, offsets = arm.coupling
+        return body_points(arm.chain, positions @ matrix.T + offsets, tool)[..., [*arm.chain_places, -1], :]
     rotation = np.broadcast_to(np.eye(3), (*positions.shape[:-1], 3, 3))
     origin = np.zeros((*positions.shape[:-1], 3))
     points = []

@@ -9,8 +9,9 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from problem.arm import Arm
+from problem.coupled_joints import chain_motion, torque_at_leaders
 from problem.motion import Motion
-from problem.regressor import rigid_body_torque
+from problem.regressor import coupled_links_torque, rigid_body_torque, torque_of_links
 
 
 def drive_torque(arm: Arm, motion: Motion, parameters: Array | None = None) -> Array:
@@ -40,9 +41,19 @@ def compensation_torque(arm: Arm, motion: Motion) -> Array:
     still = np.zeros(motion.position.shape)
     if not arm.compensated:
         return still
-    carried = np.concatenate([link.parameters for link in arm.compensated])
-    weight = rigid_body_torque(arm, Motion(motion.position, still, still), carried)
-    return np.where([law.drive_compensates for law in arm.joint_laws], 0.0, weight)
+    at_rest = chain_motion(arm, Motion(motion.position, still, still))
+    by_drive = [law.drive_compensates for law in arm.chain.joint_laws]
+    carried = np.concatenate([link.parameters for link in arm.chain.compensated])
+    weight = torque_of_links(arm.chain, at_rest, carried)
+    return torque_at_leaders(arm, np.where(by_drive, 0.0, weight))
+
+
+def torque_beside_columns(arm: Arm, motion: Motion) -> Array:
+    """What the file of an arm states and no column has, (..., samples, joints), N m (N).
+
+    The links of coupled joints need it, less the weight that the simulator holds.
+    """
+    return coupled_links_torque(arm, motion) - compensation_torque(arm, motion)
 
 
 def position_torque(arm: Arm, motion: Motion) -> Array:

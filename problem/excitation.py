@@ -14,6 +14,7 @@ from armlab.common.derivatives import Derivatives, Question
 from problem.arm import Arm
 from problem.base_parameters import BaseParameters
 from problem.contract import DifferentiableProblem, Evaluation, Problem, why_not_differentiable
+from problem.coupled_joints import refuse_coupled
 from problem.fitness import Criterion, condition_number, singular_values
 from problem.limits import Constraints
 from problem.motion import Motion
@@ -65,6 +66,10 @@ class ExcitationProblem:
     penalty: Penalty | FeasibilityRules
     unit_columns: bool = False
     friction_columns: bool = False
+
+    def __post_init__(self) -> None:
+        """Raises InputError for an arm with coupled joints: rules and derivatives are those of free ones."""
+        refuse_coupled(self.arm, "an excitation problem")
 
     @property
     def spectral(self) -> bool:

@@ -89,7 +89,8 @@ def _repaired_urdf(text: str, path: Path, wrong: dict[str, Link]) -> str:
 
 
 def _carried(text: str, path: Path) -> tuple[tuple[CarriedLink, ...], ...]:
-    return chain_of(parse_urdf_root(text, path), path).carried
+    chain = chain_of(parse_urdf_root(text, path), path)
+    return (*chain.carried, *chain.coupled)
 
 
 def _body_of_urdf(link: UrdfElement) -> tuple[str, Link | None]:

@@ -74,7 +74,7 @@ class KinematicTree:
         """Links where an arm may end, each with its number of moving joints, most joints first.
 
         An arm ends where several branches move, unless more joints come behind that place than before it. A joint that
-        follows another one is never a part of it.
+        follows another one is a part of it where that one lies before it.
         """
         children = {joint.child for joint in self.joints}
         roots = dict.fromkeys(joint.parent for joint in self.joints if joint.parent not in children)
@@ -110,13 +110,17 @@ class KinematicTree:
             raise InputError(
                 f"--tip: {self.where} has no link '{tip}': {suggest_name(tip, tuple(dict.fromkeys(links)))}"
             )
-        way: list[TreeJoint] = []
-        link = tip
+        way = self._joints_to(tip)
+        if not any(joint.moves for joint in way):
+            raise InputError(f"--tip {tip}: no moving joint of {self.where} lies before this link")
+        return way
+
+    def _joints_to(self, link: str) -> tuple[TreeJoint, ...]:
+        """The joints from the base to a link; none to the base."""
+        before, way = {joint.child: joint for joint in self.joints}, list[TreeJoint]()
         while link in before and before[link] not in way:
             way.append(before[link])
             link = before[link].parent
-        if not any(joint.moves for joint in way):
-            raise InputError(f"--tip {tip}: no moving joint of {self.where} lies before this link")
         return tuple(reversed(way))
 
     def _ends_behind(self, link: str, before: int) -> list[tuple[str, int]]:
@@ -129,11 +133,16 @@ class KinematicTree:
         return [end for joint in free for end in self._ends_behind(joint.child, before + joint.free)]
 
     def _longest_from(self, joint: TreeJoint, seen: Sequence[TreeJoint] = ()) -> int:
-        """The most free joints in one chain from a joint on, itself included; none behind one that follows another."""
-        if joint.follows is not None or joint in seen:
+        """The most free joints in one chain from a joint on, itself included; none behind one led from elsewhere."""
+        if joint in seen or (joint.follows is not None and not self._is_led_on_its_way(joint)):
             return 0
         lengths = [self._longest_from(each, (*seen, joint)) for each in self.joints if each.parent == joint.child]
         return joint.free + max(lengths, default=0)
+
+    def _is_led_on_its_way(self, joint: TreeJoint) -> bool:
+        """Whether a joint follows one that lies between the base and it."""
+        leader = "" if joint.follows is None else joint.follows.leader
+        return any(each.name == leader for each in self._joints_to(joint.parent))
 
     def _joints_from(self, joint: TreeJoint) -> list[TreeJoint]:
         """A joint and all behind it."""

@@ -10,6 +10,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError, in_one_line
 from problem.arm import Arm, Joint, JointLaw, Limits, Link
+from problem.coupled_joints import couple_joints
 from problem.kinematic_tree import Follower, KinematicTree, TreeJoint
 from problem.mjcf_document import UneditableError
 from problem.mjcf_laws import is_disabled, read_joint_laws, read_rotors
@@ -115,7 +116,7 @@ def arm_of(model: Any, path: Path) -> Arm:
     """The arm of a mujoco.MjModel; path: of its file, for messages. Raises InputError as `read_mjcf`."""
     if model.njnt == 0:
         raise InputError(f"{path} has no joint")
-    _refuse_constraints(model, path)
+    follows = _read_couplings(model, path)
     joints: list[Joint] = []
     for body, carrier, pose in _walk_bodies(model):
         numbers = joints_of_body(model, body)
@@ -129,7 +130,7 @@ def arm_of(model: Any, path: Path) -> Arm:
     laws = read_joint_laws(model, path)
     compensated = tuple(_compensated(model, own) for own in groups)
     is_compensated = any(link.mass for link in compensated)
-    return Arm(
+    chain = Arm(
         name=path.stem,
         joints=tuple(joints),
         links=tuple(link_from_pseudo_inertia(_sum_of(own)) for own in groups),
@@ -138,6 +139,7 @@ def arm_of(model: Any, path: Path) -> Arm:
         joint_laws=laws if is_compensated or any(law != JointLaw() for law in laws) else (),
         compensated=compensated if is_compensated else (),
     )
+    return couple_joints(chain, follows, str(path))
 
 
 def _sum_of(carried: "tuple[CarriedBody, ...]") -> Array:
@@ -151,19 +153,27 @@ def _compensated(model: Any, carried: "tuple[CarriedBody, ...]") -> Link:
     return Link(mass, (x, y, z), (0.0,) * 6)
 
 
-def _refuse_constraints(model: Any, path: Path) -> None:
-    """Raises InputError for active equality constraints: what they tie can be locked, or is no chain."""
+def _read_couplings(model: Any, path: Path) -> dict[str, Follower]:
+    """What joints follow by the active equality constraints; InputError for those that are no line between joints."""
+    out: dict[str, Follower] = {}
     if is_disabled(model, "EQUALITY", "CONSTRAINT"):
-        return
+        return out
     kinds = import_mujoco().mjtEq
     for number in np.flatnonzero(model.eq_active0).tolist():
         name, kind = model.equality(number).name, int(model.eq_type[number])
         what = f"{path}, equality constraint {repr(name) if name else number + 1}"
         tree = mjcf_tree(model, path)
-        if kind == kinds.mjEQ_JOINT:
-            tied = model.joint(int(model.eq_obj1id[number])).name
-            raise tree.refuse(f"{what}: a joint of the arm, '{tied}', that follows another one is not supported")
-        raise tree.refuse(f"{what}: closed chains are not supported")
+        if kind != kinds.mjEQ_JOINT:
+            raise tree.refuse(f"{what}: closed chains are not supported")
+        tied = model.joint(int(model.eq_obj1id[number])).name
+        if int(model.eq_obj2id[number]) < 0:
+            raise InputError(f"{what}: it holds joint '{tied}' still: use --lock of `armlab recording import` instead")
+        if model.eq_data[number, 2:5].any():
+            raise tree.refuse(f"{what}: joint '{tied}' follows a curve, only a straight line is supported")
+        if tied in out:
+            raise tree.refuse(f"{what}: joint '{tied}' follows two joints; closed chains are not supported")
+        out[tied] = _line(model, number)
+    return out
 
 
 def mjcf_tree(model: Any, path: Path) -> KinematicTree:
@@ -193,13 +203,18 @@ def _follower(model: Any, joint: int) -> Follower | None:
     """What a joint follows by an equality constraint that is a straight line."""
     kind = import_mujoco().mjtEq.mjEQ_JOINT
     for equality in range(model.neq):
-        straight = not model.eq_data[equality, 2:5].any()
-        leader = int(model.eq_obj2id[equality])
-        if model.eq_type[equality] == kind and model.eq_obj1id[equality] == joint and leader >= 0 and straight:
-            start, slope = model.eq_data[equality, :2].tolist()
-            zero, leader_zero = (float(model.qpos0[model.jnt_qposadr[each]]) for each in (joint, leader))
-            return Follower(model.joint(leader).name, slope, zero + start - slope * leader_zero)
+        straight, led = not model.eq_data[equality, 2:5].any(), int(model.eq_obj2id[equality]) >= 0
+        if model.eq_type[equality] == kind and model.eq_obj1id[equality] == joint and led and straight:
+            return _line(model, equality)
     return None
+
+
+def _line(model: Any, equality: int) -> Follower:
+    """The straight line of an equality constraint of two joints, which counts from their reference positions."""
+    joint, leader = int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality])
+    start, slope = model.eq_data[equality, :2].tolist()
+    zero, leader_zero = (float(model.qpos0[model.jnt_qposadr[each]]) for each in (joint, leader))
+    return Follower(model.joint(leader).name, slope, zero + start - slope * leader_zero)
 
 
 def joints_of_body(model: Any, body: int) -> range:

@@ -108,14 +108,17 @@ def makers_of(document: XmlText) -> list[str]:
 
 
 def own_node(body: XmlNode, tag: str) -> tuple[XmlNode, XmlNode] | None:
-    """The element of a body with a tag, frames included, and the element that holds it."""
+    """The first element of a body with a tag, and the element that holds it; None where it has none."""
+    return next(own_nodes(body, tag), None)
+
+
+def own_nodes(body: XmlNode, tag: str) -> Iterator[tuple[XmlNode, XmlNode]]:
+    """The elements of a body with a tag, frames included, each with the element that holds it."""
     for child in body.children:
         if child.tag == tag:
-            return child, body
-        found = own_node(child, tag) if child.tag == "frame" else None
-        if found is not None:
-            return found
-    return None
+            yield child, body
+        elif child.tag == "frame":
+            yield from own_nodes(child, tag)
 
 
 def _bodies_in(node: XmlNode) -> Iterator[XmlNode]:

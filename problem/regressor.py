@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from problem.arm import Arm, Joint
+from problem.coupled_joints import chain_motion, torque_at_leaders
 from problem.kernel import ffi, lib, pointer
 from problem.motion import Motion
 
@@ -28,10 +29,22 @@ def observation_matrix(arm: Arm, motion: Motion) -> Array:
     Raises ValueError if the joint counts differ.
     """
     joints = _check_joint_count(arm, motion)
+    if arm.coupled:
+        return _coupled_observation_matrix(arm, motion)
     out = np.zeros((*motion.batch, motion.samples * joints, 10 * joints))
     samples = motion.position.size // joints
     lib.observation_matrices(joints, *_kernel_data(arm), samples, *_motion_pointers(motion), pointer(out))
     return out
+
+
+def _coupled_observation_matrix(arm: Arm, motion: Motion) -> Array:
+    """The rows of all joints of the chain, summed as they work at the own joints: the columns of the own links."""
+    matrix = arm.coupling[0]
+    count, joints = matrix.shape
+    whole = observation_matrix(arm.chain, chain_motion(arm, motion))
+    by_joint = whole.reshape(*motion.batch, motion.samples, count, count, 10)[..., list(arm.chain_places), :]
+    rows = np.einsum("...clp,cj->...jlp", by_joint, matrix)
+    return np.asarray(rows.reshape(*motion.batch, motion.samples * joints, 10 * joints))
 
 
 def gram_matrix(arm: Arm, motion: Motion, columns: NDArray[np.intp]) -> Array:
@@ -54,6 +67,12 @@ def extended_gram_matrix(arm: Arm, motion: Motion, columns: NDArray[np.intp], ow
     owned = own.shape[-1]
     if own.shape[:-1] != motion.position.shape or owned > MAX_OWNED:
         raise ValueError(f"own columns should have the shape {motion.position.shape} and up to {MAX_OWNED} a joint")
+    if arm.coupled:
+        rigid = observation_matrix(arm, motion)[..., columns]
+        rows = np.zeros((*own.shape[:-1], joints, owned))
+        rows[..., np.arange(joints), np.arange(joints), :] = own
+        whole = np.concatenate([rigid, rows.reshape(*rigid.shape[:-1], joints * owned)], axis=-1)
+        return np.asarray(np.swapaxes(whole, -1, -2) @ whole)
     size = len(columns) + joints * owned
     out = np.empty((*motion.batch, size, size))
     scratch = np.empty(PARTIAL_SUMS * (size**2 + 1))
@@ -77,13 +96,33 @@ def extended_gram_matrix(arm: Arm, motion: Motion, columns: NDArray[np.intp], ow
 
 
 def rigid_body_torque(arm: Arm, motion: Motion, parameters: Array | None = None) -> Array:
-    """Joint torques of the rigid links, W @ phi, without rotors and friction.
+    """Joint torques of the rigid links, W @ phi and that of the links of coupled joints, without rotors and friction.
 
     motion: (..., samples, joints); parameters: (10 * joints,), the arm's own if left out.
     Returns (..., samples, joints), N m (N). Raises ValueError without parameters or if joint counts differ.
     """
+    torque = torque_of_links(arm, motion, arm.parameters if parameters is None else parameters)
+    return torque + coupled_links_torque(arm, motion) if arm.coupled else torque
+
+
+def coupled_links_torque(arm: Arm, motion: Motion) -> Array:
+    """Joint torques of the links of coupled joints, (..., samples, joints), N m (N); zeros without any."""
+    if not arm.coupled:
+        return np.zeros(motion.position.shape)
+    parameters = arm.chain.parameters.reshape(-1, 10)
+    parameters[list(arm.chain_places)] = 0.0
+    torque = torque_of_links(arm.chain, chain_motion(arm, motion), parameters.ravel())
+    return torque_at_leaders(arm, torque)
+
+
+def torque_of_links(arm: Arm, motion: Motion, parameters: Array) -> Array:
+    """W @ phi, (..., samples, joints), N m (N): linear in the parameters (10 * joints,); errors as above."""
     joints = _check_joint_count(arm, motion)
-    phi = np.ascontiguousarray(arm.parameters if parameters is None else parameters, dtype=np.float64)
+    if arm.coupled:
+        whole = np.zeros((len(arm.chain), 10))
+        whole[list(arm.chain_places)] = np.asarray(parameters).reshape(joints, 10)
+        return torque_at_leaders(arm, torque_of_links(arm.chain, chain_motion(arm, motion), whole.ravel()))
+    phi = np.ascontiguousarray(parameters, dtype=np.float64)
     if phi.shape != (10 * joints,):
         raise ValueError(f"{arm.name!r} takes {10 * joints} parameters, not an array of shape {phi.shape}")
     out = np.empty(motion.position.shape)

@@ -131,16 +131,16 @@ MAX_LENGTH = 1e3  # m, from joint to joint
 
 def check_arm(arm: Arm, where: str) -> Arm:
     """The arm; InputError for more joints than can be computed, joints of one name, and numbers that no arm has."""
-    if len(arm) > MAX_JOINTS:
-        raise InputError(f"{where} has {len(arm)} moving joints; at most {MAX_JOINTS} are supported")
-    names = [joint.name for joint in arm.joints]
+    if len(arm.chain) > MAX_JOINTS:
+        raise InputError(f"{where} has {len(arm.chain)} moving joints; at most {MAX_JOINTS} are supported")
+    names = [joint.name for joint in arm.chain.joints]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise InputError(f"{where}: two joints are called '{twice[0]}'; give each a name of its own")
     for number, link in enumerate(arm.links or (), 1):
         if np.abs(link.parameters).max() > MAX_LINK_PARAMETER:
             raise InputError(f"{where}: link {number} has {_largest(link):g}; at most {MAX_LINK_PARAMETER:g} kg, kg.m2")
-    for joint in arm.joints:
+    for joint in arm.chain.joints:
         if max(np.abs(joint.before[:3, 3]).max(), np.abs(joint.after[:3, 3]).max()) > MAX_LENGTH:
             raise InputError(f"{where}: joint '{joint.name}' is more than {MAX_LENGTH:g} m from the one before")
     return arm

@@ -8,6 +8,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from problem.arm import Arm
+from problem.coupled_joints import chain_motion, torque_at_leaders
 from problem.drive_torque import drive_torque
 from problem.mjcf import arm_of, compile_mjcf, import_mujoco
 from problem.motion import Motion
@@ -44,7 +45,7 @@ def check_with_mujoco(path: Path, with_actuators: bool) -> SimulatorCheck:
     arm = arm_of(model, path)
     motion = random_states(arm, np.random.default_rng(0))
     without_loss = replace(arm, joint_laws=tuple(replace(law, friction=0.0) for law in arm.joint_laws))
-    simulated = mujoco_torque(model, motion)
+    simulated = torque_at_leaders(arm, mujoco_torque(model, chain_motion(arm, motion)))
     worst = np.abs(drive_torque(without_loss, motion) - simulated).max() / max(np.abs(simulated).max(), 1e-300)
     return SimulatorCheck(float(worst), tuple(_left_out(model, with_actuators)))
 

@@ -9,6 +9,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from problem.arm import Arm, Joint, JointLaw, Link
+from problem.coupled_joints import couple_joints
 from problem.kinematic_tree import KinematicTree
 from problem.pseudo_inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
 from problem.transforms import inverse, turn_z_to
@@ -28,19 +29,22 @@ class CarriedLink:
 
 @dataclass(frozen=True, eq=False)
 class UrdfChain:
-    """A URDF document, comments included, and its moving joints from the base on, with the links that each carries."""
+    """A URDF document, comments included, and its arm with the links that each joint carries, from the base on.
+
+    carried: by the arm's own joints; coupled: by the joints that they lead.
+    """
 
     root: ElementTree.Element
     arm: Arm
-    joints: tuple[ElementTree.Element, ...]
     carried: tuple[tuple[CarriedLink, ...], ...]
+    coupled: tuple[tuple[CarriedLink, ...], ...] = ()
 
 
 def read_urdf(path: Path) -> Arm:
     """The arm of a URDF file; gravity is -9.81 m/s2 along z of the root link.
 
-    Raises InputError for a file that is not URDF and a closed chain; for mimic, floating and planar joints and more
-    than one branch of moving joints an UndecidedError with the links where an arm may end, if there are any.
+    Raises InputError for a file that is not URDF and a closed chain; for floating and planar joints and more than one
+    branch of moving joints an UndecidedError with the links where an arm may end, if there are any.
     """
     return read_urdf_chain(path).arm
 
@@ -55,7 +59,15 @@ def chain_of(root: ElementTree.Element, path: Path) -> UrdfChain:
     links = {
         str(node.get("name")): UrdfElement(node, f"{path}, link '{node.get('name')}'") for node in root.findall("link")
     }
-    return _assemble(root, path.stem, _order_joints(root, links, path), links)
+    chain = _assemble(root, path.stem, _order_joints(root, links, path), links)
+    follows = {each.name: each.follows for each in urdf_tree(root, path).joints if each.follows is not None}
+    arm = couple_joints(chain.arm, follows, str(path))
+    own = [joint in arm.joints for joint in chain.arm.joints]
+    carried, coupled = (
+        tuple(links for links, is_own in zip(chain.carried, own, strict=True) if is_own is wanted)
+        for wanted in (True, False)
+    )
+    return UrdfChain(root, arm, carried, coupled)
 
 
 def _order_joints(root: ElementTree.Element, links: dict[str, UrdfElement], path: Path) -> list[UrdfElement]:
@@ -100,8 +112,6 @@ def _walk_tree(root: str, by_parent: dict[str, list[UrdfElement]], tree: Kinemat
 
 
 def _refuse_unsupported(joint: UrdfElement, tree: KinematicTree) -> None:
-    if joint.node.find("mimic") is not None:
-        raise tree.refuse(f"{joint.where}: mimic joints are not supported")
     if joint.kind not in {*MOVING_KINDS, "fixed"}:
         raise tree.refuse(
             f"{joint.where}: type '{joint.node.get('type')}' is not supported: revolute, continuous, prismatic or fixed"
@@ -114,7 +124,6 @@ def _assemble(
     """Follows the tree: `pose` of each URDF link in the frame of the moving link that carries it (0: the base)."""
     moving: list[Joint] = []
     laws: list[JointLaw] = []
-    nodes: list[ElementTree.Element] = []
     groups: list[list[CarriedLink]] = []
     base = next(link for link in links if link not in {joint.end("child") for joint in chain})
     carried: dict[str, tuple[int, Array]] = {base: (0, np.eye(4))}
@@ -125,7 +134,6 @@ def _assemble(
         if joint.kind in MOVING_KINDS:
             moving.append(_joint(joint, origin))
             laws.append(joint.law)
-            nodes.append(joint.node)
             groups.append([])
             carrier, origin = len(moving), np.eye(4)
         carried[child] = carrier, origin
@@ -137,7 +145,7 @@ def _assemble(
     bodies = tuple(link_from_pseudo_inertia(inertia) for inertia in sums) if known else None
     stated = tuple(laws) if any(law != JointLaw() for law in laws) else ()
     arm = Arm(str(root.get("name") or name), tuple(moving), bodies, joint_laws=stated)
-    return UrdfChain(root, arm, tuple(nodes), tuple(tuple(own) for own in groups))
+    return UrdfChain(root, arm, tuple(tuple(own) for own in groups))
 
 
 def _joint(joint: UrdfElement, origin: Array) -> Joint:

@@ -15,7 +15,7 @@ from armlab.effects.term import SIGN_SIGMAS, Term, format_number
 from problem.arm import PARAMETER_NAMES, PARAMETER_UNITS, Arm
 from problem.motion import Motion
 from problem.pseudo_inertia import pseudo_inertia_basis
-from problem.regressor import observation_matrix, rigid_body_torque
+from problem.regressor import observation_matrix, torque_of_links
 
 PLACE_PARAMETERS = (Parameter("centre", "m"), Parameter("inertia", "kg.m2"))
 PAYLOAD_FACTS = Effect(
@@ -50,7 +50,7 @@ def torque_of_parameters(scene: Scene, link: int, sets: Array) -> Array:
     part = Motion(*(each[:, :link] for each in (motion.position, motion.velocity, motion.acceleration)))
     out = np.empty((len(scene.time), link, len(sets)))
     for index, ten in enumerate(sets):
-        out[:, :, index] = rigid_body_torque(arm, part, np.append(np.zeros(10 * (link - 1)), ten))
+        out[:, :, index] = torque_of_links(arm, part, np.append(np.zeros(10 * (link - 1)), ten))
     return out
 
 

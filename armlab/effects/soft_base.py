@@ -10,7 +10,7 @@ that is soft about its softest.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -98,13 +98,15 @@ def standing_scene(scene: Scene, axis: Array) -> StandingScene:
 def _make_standing_scene(scene: Scene, axis: Array) -> StandingScene:
     arm, motion = scene.arm, scene.motion
     turn = turn_z_to(axis)
+    base = Joint("base", "revolute", turn, inverse(turn))
+    coupled = tuple(replace(each, behind=each.behind + 1, leader=each.leader + 1) for each in arm.coupled)
     still = np.zeros((len(scene.time), 1))
     moved = (np.hstack([still, each]) for each in (motion.position, motion.velocity, motion.acceleration))
     return StandingScene(
         scene.run,
         scene.time,
         Motion(*moved),
-        Arm(arm.name, (Joint("base", "revolute", turn, inverse(turn)), *arm.joints), None, arm.gravity),
+        Arm(arm.name, (base, *arm.joints), None, arm.gravity, coupled=coupled),
         np.concatenate([np.zeros(10), scene.inertial]),
         np.hstack([still, scene.torque]),
     )

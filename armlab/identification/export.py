@@ -10,6 +10,7 @@ fixed first joint turns the arm into it. MJCF, the format of MuJoCo, holds armat
 """
 
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +25,7 @@ from armlab.identification.friction_lines import FrictionLine, friction_lines
 from armlab.identification.structure import Structure
 from armlab.identification.torque_model import TorqueModel
 from problem.arm import Arm
+from problem.coupled_joints import refuse_coupled
 from problem.pseudo_inertia import (
     link_of,
     links_of,
@@ -37,6 +39,7 @@ from problem.transforms import inverse, turn_z_to
 
 MIN_EXTENT_SHARE = 1e-12  # of a body's size: simulators refuse points, rods and plates
 MAX_FLAT_SHARE = 1e-9  # of a link's size: below it a point or a rod cannot be distinguished from rounding
+MAX_COUPLED_ROUNDING = 1e-12  # of a field of a joint and of those that it leads: less is rounding
 ROUNDING_SHARE = 1e-15  # of the largest of several numbers
 SPRING_FIELDS = ("stiffness", "springref")
 
@@ -125,11 +128,45 @@ def _joint_fields(model: TorqueModel, friction: tuple[FrictionLine, ...]) -> dic
     for candidate, coefficients in laws.items():
         for name, value in candidate.joint_fields(coefficients).items():
             out.setdefault(name, np.zeros(len(model.arm)))[candidate.rows[0]] += value
-    return out | {
+    out |= {
         "armature": np.maximum(model.rotor_inertia, 0.0),
         "damping": np.array([line.slope for line in friction]),
         "frictionloss": np.array([line.level for line in friction]),
     }
+    return _without_coupled(model.arm, out) if model.arm.coupled else out
+
+
+def _without_coupled(arm: Arm, fields: Mapping[str, Array]) -> dict[str, Array]:
+    """Fields of the joints without those of the joints that they lead, which stay as the file has them.
+
+    Raises InputError where those have more than the model has for both.
+    """
+    out = {name: np.array(values) for name, values in fields.items()}
+    stiffness, rest = (out.setdefault(name, np.zeros(len(arm))) for name in SPRING_FIELDS)
+    moment = stiffness * rest
+    for each in arm.coupled:
+        own, slope, leader = each.law, each.multiplier, each.leader
+        out["armature"][leader] -= slope**2 * each.rotor_inertia
+        out["damping"][leader] -= slope**2 * own.damping
+        out["frictionloss"][leader] -= abs(slope) * own.friction
+        stiffness[leader] -= slope**2 * own.stiffness
+        moment[leader] -= slope * own.stiffness * (own.rest - each.offset)
+    for name in ("armature", "damping", "frictionloss"):
+        rounding = MAX_COUPLED_ROUNDING * np.abs(fields[name])
+        for joint in np.flatnonzero(out[name] < -rounding).tolist():
+            raise InputError(
+                f"the joints that {arm.joints[joint].name} leads have more {name} than the model has for all of them: "
+                "lower theirs in the robot file first"
+            )
+        out[name] = np.where(np.abs(out[name]) <= rounding, 0.0, _without_last_digits(out[name]))
+    stiffness = np.where(np.abs(stiffness) <= MAX_COUPLED_ROUNDING * np.abs(fields.get("stiffness", 0.0)), 0, stiffness)
+    rest = np.divide(moment, stiffness, out=np.zeros(len(arm)), where=stiffness != 0)
+    return out | {"stiffness": _without_last_digits(stiffness), "springref": _without_last_digits(rest)}
+
+
+def _without_last_digits(values: Array) -> Array:
+    """Values as they were before something was added and taken away again."""
+    return np.array([float(f"{value:.13g}") for value in values.tolist()])
 
 
 def _thicken_links(arm: Arm, inertial: Array) -> tuple[Array, tuple[int, ...]]:
@@ -173,7 +210,8 @@ class Body:
 
 
 def bodies(simulated: SimulatorModel) -> tuple[Body, ...]:
-    """The bodies of a model; InputError where it has no links or one that no simulator takes."""
+    """The bodies of a model; InputError where it has no links or one that no simulator takes, or coupled joints."""
+    refuse_coupled(simulated.model.arm, "a chain of bodies alone")
     origin, out = np.eye(4), []
     for index, (joint, total) in enumerate(zip(simulated.model.arm.joints, link_inertias(simulated), strict=True)):
         mass, centre, inertia = body_numbers(transform_pseudo_inertia(total, joint.after))

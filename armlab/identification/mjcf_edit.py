@@ -25,6 +25,7 @@ from problem.mjcf_document import (
     moved_mjcf,
     named_nodes,
     own_node,
+    own_nodes,
     read_mjcf_document,
 )
 from problem.mjcf_laws import sum_at_joints
@@ -169,10 +170,10 @@ def _set_joints(document: XmlText, nodes: Mapping[int, XmlNode], before: Any, me
 
 def _joint_node(document: XmlText, nodes: Mapping[int, XmlNode], before: Any, joint: int, path: Path) -> XmlNode:
     body = int(before.jnt_bodyid[joint])
-    found = own_node(nodes[body], "joint") if body in nodes else None
-    if found is None:
+    found = [node for node, _ in own_nodes(nodes[body], "joint")] if body in nodes else []
+    if len(found) != before.body_jntnum[body]:
         raise UneditableError(_not_in_text(f"joint '{before.joint(joint).name}'", document, path))
-    return found[0]
+    return found[joint - int(before.body_jntadr[body])]
 
 
 def _set_drives(document: XmlText, nodes: Mapping[int, XmlNode], before: Any, meant: Meant, path: Path) -> None:

@@ -24,11 +24,21 @@ from armlab.identification.mjcf_edit import (
 )
 from armlab.identification.patch import Carried, Patched, Target, check_same_arm, share_inertia
 from problem.locked_joints import lock_spec
-from problem.mjcf import arm_of, body_inertia, carried_bodies, compile_mjcf, import_mujoco, mjcf_spec, written_mjcf
+from problem.mjcf import (
+    arm_of,
+    body_inertia,
+    carried_bodies,
+    compile_mjcf,
+    import_mujoco,
+    joints_of_body,
+    mjcf_spec,
+    written_mjcf,
+)
 from problem.mjcf_document import body_nodes, moved_mjcf
 from problem.urdf_document import read_urdf_root
 
 NO_DRIVES: Mapping[int, Drive] = MappingProxyType({})
+MAX_NOTHING = 1e-6  # of the largest link: a frame without mass, as simulators want it
 MESH_SUFFIXES = (".stl", ".obj", ".msh")  # that MuJoCo reads
 
 
@@ -68,14 +78,22 @@ def _patched_from_urdf(simulated: SimulatorModel, target: Target, drives: Mappin
 def _meant(simulated: SimulatorModel, before: Any, spec: Any, target: Target, drives: Mapping[int, Drive]) -> Meant:
     """What the file should hold. before: the mujoco.MjModel of the file; spec: the same, which is used up."""
     locked = lock_spec(spec, target.path, target.positions)
-    check_same_arm(simulated, arm_of(locked, target.path), target.path)
+    arm = arm_of(locked, target.path)
+    check_same_arm(simulated, arm, target.path)
     inertias = {number: body_inertia(before, number) for number in range(1, before.nbody)}
-    groups, notes = carried_bodies(locked), list[str]()
-    if not all(groups):
-        raise InputError(
-            f"{target.path}: more than one joint on a body is not supported: export with --into another file"
-        )
-    for group, total in zip(groups, link_inertias(simulated), strict=True):
+    groups, totals, notes = carried_bodies(locked), link_inertias(simulated), list[str]()
+    moved = [joint for group in groups if group for joint in joints_of_body(before, group[0].number)]
+    joints = tuple(moved[place] for place in arm.chain_places)
+    largest = max(float(np.trace(total)) for total in totals)
+    for place, joint, total in zip(arm.chain_places, joints, totals, strict=True):
+        group = groups[place]
+        if not group:
+            if np.trace(total) > MAX_NOTHING * largest:
+                raise InputError(
+                    f"{target.path}: joint '{before.joint(joint).name}' and the next one turn the same body, so the "
+                    "file has no place for the body that the model has between them: export with --into another file"
+                )
+            continue
         first = group[0].number
         own = [Carried(before.body(e.number).name, e.seen, _moves_against(before, e.number, first)) for e in group]
         shares = share_inertia(total, own, target.path)
@@ -90,7 +108,6 @@ def _meant(simulated: SimulatorModel, before: Any, spec: Any, target: Target, dr
     ]
     if held:
         notes.append(f"gravcomp of {join_words(held)} holds the changed weight, too; the recorded drives did not")
-    joints = tuple(int(before.body_jntadr[group[0].number]) for group in groups)
     return Meant(
         inertias=inertias,
         joints=joints,

@@ -13,7 +13,7 @@ from armlab.recordings.cutoff import ROWS_PER_CUTOFF, choose_cutoff
 from armlab.recordings.differentiate import Signals, differentiate, resample_evenly
 from armlab.recordings.filters import Butterworth, LowPass
 from armlab.recordings.recording import Run
-from problem.drive_torque import compensation_torque
+from problem.drive_torque import torque_beside_columns
 
 MAX_CUTOFF_SHARE = 0.45  # of the sampling rate: cut-offs
 
@@ -103,7 +103,7 @@ def suggested_cutoff(run: Run) -> float:
 
 
 def _target(structure: Structure, signals: Signals) -> Array:
-    return np.asarray(signals.torque + signals.filter(compensation_torque(structure.arm, signals.motion)))
+    return np.asarray(signals.torque - signals.filter(torque_beside_columns(structure.arm, signals.motion)))
 
 
 def require_rows(data: Regression) -> None:

@@ -29,7 +29,7 @@ from armlab.identification.structure import Structure
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.recording import Run
 from problem.arm import Arm
-from problem.drive_torque import compensation_torque
+from problem.drive_torque import torque_beside_columns
 
 Groups = Mapping[str, tuple[Candidate, ...]]
 USUAL_GROUPS = ("viscous", "coulomb", "rotor", "offset")
@@ -219,5 +219,5 @@ def unfiltered_regression(structure: Structure, signals: Sequence[Signals], data
             each.motion.samples, data.joints, -1
         )
         matrices.append(whole[rows].reshape(-1, structure.size))
-        torques.append((each.run.torque + compensation_torque(structure.arm, each.motion))[rows].ravel())
+        torques.append((each.run.torque - torque_beside_columns(structure.arm, each.motion))[rows].ravel())
     return replace(data, matrix=np.vstack(matrices), torque=np.concatenate(torques))

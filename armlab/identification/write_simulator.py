@@ -170,7 +170,7 @@ def _choose_target(
     moving = [joint.name for joint in tree.joints if joint.moves]
     known = {} if record is None else {name: value for name, value in record.positions.items() if name in moving}
     positions = {**known, **tree.locked_positions(None, locks)}
-    own = {joint.name for joint in simulated.model.arm.joints}
+    own = {joint.name for joint in simulated.model.arm.chain.joints}
     moved = [name for name in locks if name in own]
     if moved:
         raise InputError(

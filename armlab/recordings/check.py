@@ -31,7 +31,7 @@ from armlab.recordings.reading.signs import compare_standstill
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import AnyRun, Finding, MotionRun, Recording, Run
 from armlab.recordings.recording_file import RecordingFile, RunEntry
-from problem.arm import Arm
+from problem.arm import Arm, CoupledJoint
 from problem.impossible_bodies import find_impossible_bodies
 from problem.joint_words import joint_in_words, joints_in_words
 from problem.simulator_check import check_with_mujoco
@@ -272,7 +272,14 @@ def _stated_laws(arm: Arm) -> tuple[Finding, ...]:
     }
     places = {name: [joint for joint, value in enumerate(values, 1) if value] for name, values in own.items()}
     parts = [f"{name} at {joints_in_words(arm, joints)}" for name, joints in places.items() if joints]
+    parts += [f"{each.joint.name} follows {_leader_in_words(arm, each)}" for each in arm.coupled]
     return (Finding("simulation", "note", f"in the simulation, by its file: {'; '.join(parts)}"),) if parts else ()
+
+
+def _leader_in_words(arm: Arm, coupled: CoupledJoint) -> str:
+    """The line on which a coupled joint moves, and that its link is no unknown."""
+    name, start = arm.joints[coupled.leader].name, f" {coupled.offset:+g}" if coupled.offset else ""
+    return f"{name} ({coupled.multiplier:g} times{start}, its link as the file has it)"
 
 
 def _compare_with_simulator(recording: Recording | MotionRecording, with_actuators: bool) -> tuple[Finding, ...]:

@@ -18,6 +18,7 @@ from armlab.recordings.recording_file import (
 )
 from armlab.recordings.table import read_table
 from problem.arm import Arm
+from problem.coupled_joints import refuse_coupled
 from problem.mjcf import compile_mjcf
 from problem.mjcf_servos import refuse_other_drives
 from problem.robot_file import load_arm
@@ -100,6 +101,7 @@ def open_motion_recording(folder: Path) -> tuple[MotionRecording, RecordingFile]
             f"simulation in {folder / FILE_NAME}: motion only is compared with the MJCF of `robot` and `controller`"
         )
     arm = load_arm(file.robot, folder)
+    refuse_coupled(arm, "a recording of motion only")
     joints = _recorded_joints(file, arm, folder)
     _check_controller(file, len(joints), folder)
     transmission = make_transmission(file, Arm(arm.name, tuple(arm.joints[joint] for joint in joints)), folder)

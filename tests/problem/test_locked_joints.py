@@ -117,7 +117,7 @@ def test_the_written_file_is_the_arm_and_its_meshes_are_found(urdf: Path, tmp_pa
         ("hand", {"finger": 0.0}, "no moving joint 'finger': did you mean 'finger2'?"),
         ("hand", {"finger2": 2.0}, "--lock finger1=0.1 should lie within the joint's limits, 0 to 0.04"),
         ("hand", {"finger1": 2.0}, "--lock finger1=2 should lie within the joint's limits, 0 to 0.04"),
-        (None, {"joint3": 0.0}, "joint 'finger2': mimic joints are not supported"),
+        (None, {"joint3": 0.0}, "joint 'finger2': a second branch of moving joints"),
     ],
 )
 def test_a_wrong_tip_or_lock_is_refused(

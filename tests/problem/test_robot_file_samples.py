@@ -19,7 +19,7 @@ REFUSED = {
     "ball_wrist.xml": "only hinge and slide joints on a fixed base",
     "four_bar.xml": "closed chains are not supported",
     "tendon_spring.xml": "stiffness of tendons is not supported",
-    "coupled_in_the_chain.xml": "'middle', that follows another one is not supported",
+    "coupled_by_a_curve.xml": "joint 'middle' follows a curve, only a straight line is supported",
 }
 CHAIN = """<mujoco><compiler angle="radian"/><worldbody><body name="a"><joint name="j" axis="0 1 0" {joint}/>
 <inertial mass="1" pos=".2 0 0" diaginertia=".01 .01 .01"/></body></worldbody></mujoco>"""
@@ -57,7 +57,9 @@ def test_the_pose_of_an_mjcf_is_that_of_the_reference_position(tmp_path: Path) -
     assert moved.joints[0].limits.position == (-1, 1)
 
 
-@pytest.mark.parametrize("name", ["ref_and_springref.xml", "gravity_partly_compensated.xml", "friction_alone.urdf"])
+@pytest.mark.parametrize(
+    "name", ["ref_and_springref.xml", "gravity_partly_compensated.xml", "friction_alone.urdf", "coupled_wrist.xml"]
+)
 def test_the_nominal_model_has_the_torque_of_the_arm_with_all_its_laws(name: str) -> None:
     arm = load_arm(str(FILES / name))
     motion, model = random_states(arm, np.random.default_rng(1)), nominal_model(arm, name)

@@ -33,7 +33,7 @@ from problem.pseudo_inertia import (
     pseudo_inertias,
     regular_nominal,
 )
-from problem.regressor import observation_matrix, rigid_body_torque
+from problem.regressor import coupled_links_torque, observation_matrix, rigid_body_torque
 
 FOLDS = 2  # even and odd blocks are held out in turn
 JOINT_COLUMNS = 8  # of a joint: viscous and Coulomb friction, rotor inertia, offset, spring, those of a second drive
@@ -46,7 +46,8 @@ class Columns:
     """Columns of a motion: rigid (rows, joints, 10 * joints), own (rows, joints, 8), and their products on each fold.
 
     grams: (folds, joints, size, size) of the rigid columns followed by the joint's own ones. stated: (rows, joints),
-    torque of the springs and the compensated weight that the robot file states, N m (N).
+    torque of the springs and the compensated weight that the robot file states, coupled: of the links of coupled
+    joints, N m (N).
     """
 
     motion: Motion
@@ -54,6 +55,7 @@ class Columns:
     own: Array
     grams: Array
     stated: Array
+    coupled: Array
 
 
 def make_columns(arm: Arm, motion: Motion, drives: Array, fold: NDArray[np.intp]) -> Columns:
@@ -73,7 +75,7 @@ def make_columns(arm: Arm, motion: Motion, drives: Array, fold: NDArray[np.intp]
             used = np.arange(10 * joint, 10 * joints + JOINT_COLUMNS)  # links before a joint do not load it
             part = np.concatenate([rigid[rows, joint, 10 * joint :], own[rows, joint]], axis=1)
             grams[number, joint][np.ix_(used, used)] = part.T @ part
-    return Columns(motion, rigid, own, grams, position_torque(arm, motion))
+    return Columns(motion, rigid, own, grams, position_torque(arm, motion), coupled_links_torque(arm, motion))
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,7 +217,7 @@ class Fitter:
     def _target(self, reading: Reading) -> tuple[Columns, Array, Array]:
         """Columns, the torque (rows, joints) that they have to explain, and one over its scatter (joints,)."""
         columns = self.columns(reading)
-        torque = self.channels.read_torque(reading) - columns.stated
+        torque = self.channels.read_torque(reading) - columns.stated - columns.coupled
         scatter = np.std(torque, axis=0)
         return columns, torque, np.where(scatter > 0, 1 / np.where(scatter > 0, scatter, 1.0), 0.0)
 
