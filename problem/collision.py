@@ -85,7 +85,7 @@ class ArmShape:
 
     def _distances_at(self, position: Array, close: float) -> Array:
         mujoco, (first, second) = import_mujoco(), self._geoms
-        self.data.qpos[: len(position)] = self.model.qpos0[: len(position)] + position
+        self.data.qpos[: len(position)] = position
         mujoco.mj_kinematics(self.model, self.data)
         gaps = self._bounds(self.data.geom_xpos[first], self.data.geom_xpos[second])
         for number in np.flatnonzero(gaps < close).tolist():

@@ -122,6 +122,15 @@ def test_geometry_of_an_mjcf_is_what_collides_and_nothing_that_is_only_seen(tmp_
     assert distance(shape, "the base", "fore", [np.pi / 2, np.pi / 2]) < 0
 
 
+def test_a_joint_with_a_reference_position_stands_where_the_file_counts_it(tmp_path: Path) -> None:
+    joint = '<joint name="a"'
+    assert joint in MJCF
+    path = tmp_path / "arm.xml"
+    path.write_text(MJCF.replace(joint, f'{joint} ref="-90"'))
+    shape = shape_of(load_arm(str(path)), str(path), floor=0.0)
+    assert distance(shape, "the floor", "fore", [-np.pi / 2, 0]) == pytest.approx(0.97)
+
+
 URDF = """<robot name="two"><link name="base"/><link name="upper">{geometry}</link><link name="fore">{geometry}</link>
 <joint name="a" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 1"/><axis xyz="0 1 0"/>
 <limit lower="-2" upper="2" velocity="1" effort="9"/></joint>
