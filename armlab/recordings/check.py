@@ -272,14 +272,15 @@ def _stated_laws(arm: Arm) -> tuple[Finding, ...]:
     }
     places = {name: [joint for joint, value in enumerate(values, 1) if value] for name, values in own.items()}
     parts = [f"{name} at {joints_in_words(arm, joints)}" for name, joints in places.items() if joints]
-    parts += [f"{each.joint.name} follows {_leader_in_words(arm, each)}" for each in arm.coupled]
+    parts += [_coupling_in_words(arm, each) for each in arm.coupled]
     return (Finding("simulation", "note", f"in the simulation, by its file: {'; '.join(parts)}"),) if parts else ()
 
 
-def _leader_in_words(arm: Arm, coupled: CoupledJoint) -> str:
+def _coupling_in_words(arm: Arm, coupled: CoupledJoint) -> str:
     """The line on which a coupled joint moves, and that its link is no unknown."""
-    name, start = arm.joints[coupled.leader].name, f" {coupled.offset:+g}" if coupled.offset else ""
-    return f"{name} ({coupled.multiplier:g} times{start}, its link as the file has it)"
+    start = f" {'-' if coupled.offset < 0 else '+'} {abs(coupled.offset):g}" if coupled.offset else ""
+    line = f"{coupled.joint.name} = {coupled.multiplier:g} {arm.joints[coupled.leader].name}{start}"
+    return f"{line} (a coupled joint, whose link is as the file has it)"
 
 
 def _compare_with_simulator(recording: Recording | MotionRecording, with_actuators: bool) -> tuple[Finding, ...]:
