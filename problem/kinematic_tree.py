@@ -81,17 +81,27 @@ class KinematicTree:
         found = [end for root in roots for end in self._ends_behind(root, 0)]
         return dict(sorted(found, key=lambda end: -end[1]))
 
-    def refuse(self, message: str) -> InputError:
-        """The error for a tree that is no single chain, with the links that --tip may name."""
-        if not self.ends:
+    def refuse(self, message: str, tied: tuple[str, str] | None = None) -> InputError:
+        """The error for a tree that is no single chain, with the links that --tip may name.
+
+        tied: two links that are held together, so only those ends help behind which neither moves against the other.
+        """
+        helping = {link: count for link, count in self.ends.items() if tied is None or self.is_rigid(*tied, tip=link)}
+        if not helping:
             return InputError(message)
-        ends = ", ".join(f"{link} ({count} joint{'s' * (count > 1)})" for link, count in self.ends.items())
+        ends = ", ".join(f"{link} ({count} joint{'s' * (count > 1)})" for link, count in helping.items())
         return UndecidedError(
             f"{message}: say with --tip of `armlab recording import` or `armlab model lock-joints` where the arm ends, "
             f"and the joints beside it are locked: {ends}",
             "tip",
-            tuple(self.ends),
+            tuple(helping),
         )
+
+    def is_rigid(self, one: str, other: str, tip: str | None = None) -> bool:
+        """Whether no joint moves two links against each other; tip: where the arm ends, so what is beside is locked."""
+        moving = [joint for joint in (self.joints if tip is None else self._joints_to(tip)) if joint.moves]
+        first, second = ([joint for joint in self._joints_to(link) if joint in moving] for link in (one, other))
+        return first == second
 
     def _checked(self, name: str, position: float) -> float:
         known = {joint.name: joint for joint in self.joints if joint.moves}

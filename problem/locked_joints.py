@@ -14,17 +14,16 @@ from armlab.common.xml_text import parse_xml_text, read_xml_text
 from problem.arm import Arm
 from problem.kinematic_tree import KinematicTree
 from problem.mjcf import (
-    MOVING_KINDS,
     arm_of,
     compile_mjcf,
     compile_mjcf_text,
     import_mujoco,
     mjcf_spec,
-    mjcf_tree,
     written_mjcf,
 )
 from problem.mjcf_document import UneditableError, moved_mjcf
 from problem.mjcf_meshes import text_with_inertia
+from problem.mjcf_tree import MOVING_KINDS, mjcf_tree
 from problem.robot_file import check_arm
 from problem.urdf import chain_of
 from problem.urdf_document import lock_urdf, moved_urdf, read_urdf_root, urdf_text, urdf_tree

@@ -11,14 +11,13 @@ from armlab.common.arrays import Array
 from armlab.common.errors import InputError, in_one_line
 from problem.arm import Arm, Joint, JointLaw, Limits, Link
 from problem.coupled_joints import couple_joints
-from problem.kinematic_tree import Follower, KinematicTree, TreeJoint
 from problem.mjcf_document import UneditableError
 from problem.mjcf_laws import is_disabled, read_joint_laws, read_rotors
 from problem.mjcf_meshes import text_without_meshes
+from problem.mjcf_names import joint_name, name_all
+from problem.mjcf_tree import MOVING_KINDS, joints_of_body, mjcf_tree, read_couplings
 from problem.pseudo_inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
 from problem.transforms import inverse, translation, turn_z_to
-
-MOVING_KINDS = {2: "prismatic", 3: "revolute"}  # mjJNT_SLIDE, mjJNT_HINGE
 
 
 def import_mujoco() -> Any:
@@ -53,11 +52,15 @@ def compile_mjcf(path: Path) -> Any:
 
 
 def mjcf_spec(path: Path) -> Any:
-    """The mujoco.MjSpec of a file that `compile_mjcf` takes, without meshes where some are not at hand."""
+    """The mujoco.MjSpec of a file that `compile_mjcf` takes, without meshes where some are not at hand.
+
+    Bodies and joints without names get those of `mjcf_names`.
+    """
     mujoco = import_mujoco()
-    if _lacks_files(path):
-        return mujoco.MjSpec.from_string(text_without_meshes(path))
-    return mujoco.MjSpec.from_file(str(path))
+    lacks = _lacks_files(path)
+    spec = mujoco.MjSpec.from_string(text_without_meshes(path)) if lacks else mujoco.MjSpec.from_file(str(path))
+    name_all(spec)
+    return spec
 
 
 def _lacks_files(path: Path) -> bool:
@@ -116,12 +119,12 @@ def arm_of(model: Any, path: Path) -> Arm:
     """The arm of a mujoco.MjModel; path: of its file, for messages. Raises InputError as `read_mjcf`."""
     if model.njnt == 0:
         raise InputError(f"{path} has no joint")
-    follows = _read_couplings(model, path)
+    follows = read_couplings(model, path)
     joints: list[Joint] = []
     for body, carrier, pose in _walk_bodies(model):
         numbers = joints_of_body(model, body)
         if numbers and carrier != len(joints):
-            name = model.joint(numbers[0]).name
+            name = joint_name(model, numbers[0])
             raise mjcf_tree(model, path).refuse(f"{path}, joint '{name}': a second branch of moving joints")
         for number in numbers:
             joints.append(_joint(model, number, pose, path))
@@ -151,76 +154,6 @@ def _compensated(model: Any, carried: "tuple[CarriedBody, ...]") -> Link:
     parts = [float(model.body_gravcomp[each.number]) * each.seen[3] for each in carried]
     x, y, z, mass = np.sum([np.zeros(4), *parts], axis=0).tolist()
     return Link(mass, (x, y, z), (0.0,) * 6)
-
-
-def _read_couplings(model: Any, path: Path) -> dict[str, Follower]:
-    """What joints follow by the active equality constraints; InputError for those that are no line between joints."""
-    out: dict[str, Follower] = {}
-    if is_disabled(model, "EQUALITY", "CONSTRAINT"):
-        return out
-    kinds = import_mujoco().mjtEq
-    for number in np.flatnonzero(model.eq_active0).tolist():
-        name, kind = model.equality(number).name, int(model.eq_type[number])
-        what = f"{path}, equality constraint {repr(name) if name else number + 1}"
-        tree = mjcf_tree(model, path)
-        if kind != kinds.mjEQ_JOINT:
-            raise tree.refuse(f"{what}: closed chains are not supported")
-        tied = model.joint(int(model.eq_obj1id[number])).name
-        if int(model.eq_obj2id[number]) < 0:
-            raise InputError(f"{what}: it holds joint '{tied}' still: use --lock of `armlab recording import` instead")
-        if model.eq_data[number, 2:5].any():
-            raise tree.refuse(f"{what}: joint '{tied}' follows a curve, only a straight line is supported")
-        if tied in out:
-            raise tree.refuse(f"{what}: joint '{tied}' follows two joints; closed chains are not supported")
-        out[tied] = _line(model, number)
-    return out
-
-
-def mjcf_tree(model: Any, path: Path) -> KinematicTree:
-    """All joints and fixed bodies of a mujoco.MjModel, also of one that is no chain; path: for messages."""
-    joints: list[TreeJoint] = []
-    for body in range(1, model.nbody):
-        name, link = model.body(body).name, model.body(int(model.body_parentid[body])).name
-        own = joints_of_body(model, body)
-        for joint in own:
-            child = name if joint == own[-1] else f"{name}, joint {joint}"
-            joints.append(_tree_joint(model, joint, link, child))
-            link = child
-        if not own:
-            joints.append(TreeJoint(name, link, name, moves=False))
-    return KinematicTree(str(path), tuple(joints))
-
-
-def _tree_joint(model: Any, joint: int, parent: str, child: str) -> TreeJoint:
-    """A joint of the tree; one whose kind no arm has can only be locked at zero."""
-    kind = int(model.jnt_type[joint])
-    low, high = model.jnt_range[joint].tolist() if model.jnt_limited[joint] else (-np.inf, np.inf)
-    limits = (float(low), float(high)) if kind in MOVING_KINDS else (0.0, 0.0)
-    return TreeJoint(model.joint(joint).name, parent, child, True, limits, _follower(model, joint))
-
-
-def _follower(model: Any, joint: int) -> Follower | None:
-    """What a joint follows by an equality constraint that is a straight line."""
-    kind = import_mujoco().mjtEq.mjEQ_JOINT
-    for equality in range(model.neq):
-        straight, led = not model.eq_data[equality, 2:5].any(), int(model.eq_obj2id[equality]) >= 0
-        if model.eq_type[equality] == kind and model.eq_obj1id[equality] == joint and led and straight:
-            return _line(model, equality)
-    return None
-
-
-def _line(model: Any, equality: int) -> Follower:
-    """The straight line of an equality constraint of two joints, which counts from their reference positions."""
-    joint, leader = int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality])
-    start, slope = model.eq_data[equality, :2].tolist()
-    zero, leader_zero = (float(model.qpos0[model.jnt_qposadr[each]]) for each in (joint, leader))
-    return Follower(model.joint(leader).name, slope, zero + start - slope * leader_zero)
-
-
-def joints_of_body(model: Any, body: int) -> range:
-    """The numbers of the joints of a body."""
-    first = int(model.body_jntadr[body])
-    return range(first, first + int(model.body_jntnum[body]))
 
 
 def _walk_bodies(model: Any) -> Iterator[tuple[int, int, Array]]:
@@ -275,7 +208,7 @@ def _joint(model: Any, number: int, pose: Array, path: Path) -> Joint:
 
     The body stands as the file has it where the joint is at its reference position, `ref`.
     """
-    name, kind = model.joint(number).name, int(model.jnt_type[number])
+    name, kind = joint_name(model, number), int(model.jnt_type[number])
     if kind not in MOVING_KINDS:
         raise InputError(
             f"{path}, joint '{name}': only hinge and slide joints on a fixed base are supported: "

@@ -8,6 +8,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from problem.arm import JointLaw
+from problem.mjcf_names import joint_name
 
 
 def is_disabled(model: Any, *flags: str) -> bool:
@@ -76,7 +77,7 @@ def _refuse_nonlinear(model: Any, joint: int, path: Path) -> None:
     ):
         if np.any(values):
             raise InputError(
-                f"{path}, joint '{model.joint(joint).name}': {name} is no straight line, which is not supported"
+                f"{path}, joint '{joint_name(model, joint)}': {name} is no straight line, which is not supported"
             )
 
 

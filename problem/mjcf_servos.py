@@ -8,6 +8,7 @@ import numpy as np
 
 from armlab.common.errors import InputError
 from problem.mjcf_laws import is_joint_drive
+from problem.mjcf_names import joint_name
 
 
 def actuators_of(model: Any, joint: int) -> list[int]:
@@ -35,6 +36,6 @@ def refuse_other_drives(model: Any, joints: Iterable[int], path: Path) -> None:
         reason = reason_no_servo(model, actuators[0]) if actuators else None
         if reason is not None:
             raise InputError(
-                f"{path}: the actuator of joint '{model.joint(joint).name}' {reason}: the recording needs columns of "
+                f"{path}: the actuator of joint '{joint_name(model, joint)}' {reason}: the recording needs columns of "
                 "torque, or the key `controller` with the drive that took the commands"
             )

@@ -11,7 +11,9 @@ from problem.arm import Arm
 from problem.coupled_joints import chain_motion, torque_at_leaders
 from problem.drive_torque import drive_torque
 from problem.mjcf import arm_of, compile_mjcf, import_mujoco
+from problem.mjcf_names import actuator_name
 from problem.motion import Motion
+from problem.urdf_document import read_urdf_root
 
 STATES = 50  # random states within the limits
 MAX_SPEED, MAX_ACCELERATION = 3.0, 10.0  # rad/s, rad/s2 (m): as fast as arms move
@@ -42,12 +44,12 @@ def check_with_mujoco(path: Path, with_actuators: bool) -> SimulatorCheck:
     Raises InputError where the file is no arm.
     """
     model = compile_mjcf(path)
-    arm = arm_of(model, path)
+    arm, left_out = arm_of(model, path), tuple(_left_out(model, with_actuators))  # before drag is switched off
     motion = random_states(arm, np.random.default_rng(0))
     without_loss = replace(arm, joint_laws=tuple(replace(law, friction=0.0) for law in arm.joint_laws))
     simulated = torque_at_leaders(arm, mujoco_torque(model, chain_motion(arm, motion)))
     worst = np.abs(drive_torque(without_loss, motion) - simulated).max() / max(np.abs(simulated).max(), 1e-300)
-    return SimulatorCheck(float(worst), tuple(_left_out(model, with_actuators)))
+    return SimulatorCheck(float(worst), left_out)
 
 
 def random_states(arm: Arm, rng: np.random.Generator) -> Motion:
@@ -89,7 +91,21 @@ def _left_out(model: Any, with_actuators: bool) -> list[str]:
     if model.opt.density or model.opt.viscosity:
         out.append("drag of the medium (density, viscosity)")
     if model.nu and not with_actuators:
-        out.append(f"forces of the actuators {', '.join(model.actuator(each).name for each in range(model.nu))}")
+        out.append(f"forces of the actuators {', '.join(actuator_name(model, each) for each in range(model.nu))}")
     if model.nplugin:
         out.append("plugins")
     return out
+
+
+def left_out_of_urdf(path: Path) -> tuple[str, ...]:
+    """Forces that a URDF states for Gazebo alone and that are no part of the arm, in words."""
+    out = []
+    for node in read_urdf_root(path).iter("gazebo"):
+        whose = f"'{node.get('reference')}'"
+        out += [f"the spring of joint {whose}" for _ in node.findall("springStiffness")]
+        out += [f"the damping of link {whose}" for _ in node.findall("dampingFactor")]
+        states = [(each.tag, (each.text or "").strip().lower()) for each in node]
+        if {("gravity", "false"), ("gravity", "0"), ("turnGravityOff", "true"), ("turnGravityOff", "1")} & set(states):
+            out.append(f"that link {whose} has no weight")
+        out += [f"joint '{each.get('name')}', which closes a chain" for each in node.findall("joint")]
+    return tuple(out)

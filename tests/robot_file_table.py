@@ -27,6 +27,8 @@ TIPS = {
     "gripper_equality.xml": "hand",
     "two_arms.xml": "left_hand",
     "free_base.xml": "shank",
+    "gripper_with_loop.xml": "gripper",
+    "scene_without_names.xml": "fore",
     "fingers_that_mimic.urdf": "hand",
     "two_legs.urdf": "L_foot",
     "floating_base.urdf": "a",

@@ -17,7 +17,7 @@ from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.xml_text import XmlNode, XmlText, parse_xml_text
 from armlab.identification.export import body_numbers, format_numbers, inertia_entries
-from problem.mjcf import MOVING_KINDS, body_inertia, compile_mjcf_text, import_mujoco, mjcf_spec, written_mjcf
+from problem.mjcf import body_inertia, compile_mjcf_text, import_mujoco, mjcf_spec, written_mjcf
 from problem.mjcf_document import (
     UneditableError,
     body_nodes,
@@ -29,6 +29,7 @@ from problem.mjcf_document import (
     read_mjcf_document,
 )
 from problem.mjcf_laws import sum_at_joints
+from problem.mjcf_tree import MOVING_KINDS
 
 MAX_CHANGE = 1e-9  # of a body's size: less is rounding, and the number stays as it is written
 MAX_ERROR = 1e-6  # of a body's size: how far the file that is written may be from what is meant

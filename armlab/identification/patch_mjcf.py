@@ -30,11 +30,11 @@ from problem.mjcf import (
     carried_bodies,
     compile_mjcf,
     import_mujoco,
-    joints_of_body,
     mjcf_spec,
     written_mjcf,
 )
 from problem.mjcf_document import body_nodes, moved_mjcf
+from problem.mjcf_tree import joints_of_body
 from problem.urdf_document import read_urdf_root
 
 NO_DRIVES: Mapping[int, Drive] = MappingProxyType({})

@@ -27,7 +27,8 @@ from problem.arm import Arm
 from problem.joint_words import joint_in_words, joints_in_words
 from problem.kinematic_tree import KinematicTree
 from problem.locked_joints import read_lock_record
-from problem.mjcf import compile_mjcf, mjcf_tree
+from problem.mjcf import compile_mjcf
+from problem.mjcf_tree import mjcf_tree
 from problem.urdf_document import read_urdf_root, urdf_tree
 
 FORMATS = (".urdf", ".xml")

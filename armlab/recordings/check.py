@@ -34,7 +34,7 @@ from armlab.recordings.recording_file import RecordingFile, RunEntry
 from problem.arm import Arm, CoupledJoint
 from problem.impossible_bodies import find_impossible_bodies
 from problem.joint_words import joint_in_words, joints_in_words
-from problem.simulator_check import check_with_mujoco
+from problem.simulator_check import check_with_mujoco, left_out_of_urdf
 
 MIN_FROZEN_TIME_S = 0.25  # a torque that repeats to the last digit for so long while its joint moves
 
@@ -284,11 +284,15 @@ def _coupling_in_words(arm: Arm, coupled: CoupledJoint) -> str:
 
 
 def _compare_with_simulator(recording: Recording | MotionRecording, with_actuators: bool) -> tuple[Finding, ...]:
-    """Whether the torque of an MJCF is MuJoCo's own, and what of the file is left out; nothing of other robots.
+    """Whether the torque of an MJCF is MuJoCo's own, and what of it or of a URDF is left out; nothing of other robots.
 
     with_actuators: whether those of the file are the drives.
     """
     path = recording.folder / recording.robot
+    if path.suffix == ".urdf":
+        left_out = left_out_of_urdf(path)
+        text = f"left out of {recording.robot}, what it states for Gazebo alone: {'; '.join(left_out)}"
+        return (Finding("simulator", "warning", text),) if left_out else ()
     if path.suffix != ".xml":
         return ()
     found = check_with_mujoco(path, with_actuators)

@@ -20,7 +20,7 @@ from problem.simulator_check import random_states
 
 MJCF = (
     *("childclass_arm.xml", "ref_and_springref.xml", "gravity_partly_compensated.xml", "geared_actuators.xml"),
-    *("three_joints_on_a_body.xml", "coupled_wrist.xml"),
+    *("three_joints_on_a_body.xml", "coupled_wrist.xml", "telescope_backwards.xml"),
 )
 URDF = ("damping_of_every_joint.urdf", "friction_alone.urdf", "lift_and_arm.urdf", "telescope_that_mimics.urdf")
 

@@ -32,7 +32,7 @@ TELESCOPE = """<robot name="t"><link name="base"/>
 CHAIN = """<mujoco><worldbody><body name="x"><joint name="a" axis="0 1 0"/>{inertial}
 <body name="y" pos=".3 0 0"><joint name="b" axis="0 1 0"/>{inertial}
 <body name="z" pos=".3 0 0"><joint name="c" axis="0 1 0"/>{inertial}</body></body></body></worldbody>
-<equality>{equality}</equality></mujoco>"""
+<tendon><fixed name="t"><joint joint="a" coef="1"/></fixed></tendon><equality>{equality}</equality></mujoco>"""
 INERTIAL = '<inertial mass="1" pos=".1 0 0" diaginertia=".01 .02 .02"/>'
 
 
@@ -115,7 +115,7 @@ def test_equality_constraints_are_those_with_which_mujoco_simulates() -> None:
 @pytest.mark.parametrize(
     ("equality", "reason"),
     [
-        ('<joint joint1="b" joint2="c"/>', "joint 'b' follows 'c', which is no moving joint before it"),
+        ('<tendon tendon1="t"/>', "only joints may be coupled"),
         ('<joint joint1="b" polycoef="0.3 0 0 0 0"/>', "it holds joint 'b' still"),
         ('<joint joint1="c" joint2="b" polycoef="0 1 2 0 0"/>', "joint 'c' follows a curve"),
         ('<joint joint1="c" joint2="b"/><joint joint1="c" joint2="a"/>', "joint 'c' follows two joints"),
@@ -143,6 +143,14 @@ def test_a_joint_that_follows_a_follower_follows_its_leader(tmp_path: Path) -> N
         (2.0, 0.1),
         (-6.0, pytest.approx(0.2 - 3 * 0.1)),
     ]
+
+
+def test_where_a_constraint_names_the_joint_in_front_first_the_one_behind_follows(tmp_path: Path) -> None:
+    line = '<joint joint1="a" joint2="c" polycoef="0.1 -2 0 0 0"/>'
+    (tmp_path / "arm.xml").write_text(CHAIN.format(inertial=INERTIAL, equality=line))
+    arm = load_arm(str(tmp_path / "arm.xml"))
+    assert [joint.name for joint in arm.joints] == ["a", "b"]
+    assert (arm.coupled[0].multiplier, arm.coupled[0].offset) == (-0.5, pytest.approx(0.05))
 
 
 def test_a_switched_off_constraint_leaves_its_joints_free(tmp_path: Path) -> None:

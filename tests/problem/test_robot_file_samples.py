@@ -11,9 +11,10 @@ from armlab.effects.scene import instants
 from armlab.identification.nominal import nominal_model
 from problem.arm import link_poses
 from problem.drive_torque import drive_torque
+from problem.locked_joints import lock_joints
 from problem.motion import Motion
 from problem.robot_file import load_arm
-from problem.simulator_check import random_states
+from problem.simulator_check import check_with_mujoco, left_out_of_urdf, random_states
 
 REFUSED = {
     "ball_wrist.xml": "only hinge and slide joints on a fixed base",
@@ -47,6 +48,39 @@ def test_laws_of_a_joint_that_are_no_lines_are_refused_by_name(tmp_path: Path, j
     path = tmp_path / "bent.xml"
     path.write_text(CHAIN.format(joint=joint))
     assert f"joint 'j': {reason}" in refusal(load_arm, str(path))
+
+
+def test_a_loop_within_a_gripper_that_is_locked_is_none() -> None:
+    message = refusal(load_arm, str(FILES / "gripper_with_loop.xml"))
+    assert "closed chains are not supported: say with --tip" in message
+    assert message.endswith("the joints beside it are locked: gripper (2 joints)")
+
+
+def test_a_loop_that_no_tip_opens_is_refused_without_one(tmp_path: Path) -> None:
+    assert refusal(lock_joints, FILES / "four_bar.xml", "b", {}, tmp_path).endswith("closed chains are not supported")
+
+
+def test_joints_without_names_are_called_by_their_bodies(tmp_path: Path) -> None:
+    path = FILES / "scene_without_names.xml"
+    assert "joint 'cube_joint': only hinge and slide" in refusal(load_arm, str(path))
+    locked = lock_joints(path, "fore", {}, tmp_path)
+    assert locked.positions == {"cube_joint": 0.0}
+    assert [joint.name for joint in locked.arm.joints] == ["body2_joint", "elbow"]
+    (tmp_path / "arm.xml").write_text(locked.document)
+    assert check_with_mujoco(tmp_path / "arm.xml", with_actuators=False).left_out == (
+        "forces of the actuators number 1",
+    )
+
+
+def test_what_is_left_out_of_a_file_is_listed_by_name(tmp_path: Path) -> None:
+    assert check_with_mujoco(FILES / "under_water.xml", with_actuators=True).left_out == (
+        "drag of the medium (density, viscosity)",
+    )
+    gazebo = """<gazebo reference="elbow"><springStiffness>3</springStiffness></gazebo>
+<gazebo reference="hand"><gravity>false</gravity></gazebo></robot>"""
+    (tmp_path / "arm.urdf").write_text((FILES / "plain_cobot.urdf").read_text().replace("</robot>", gazebo))
+    assert left_out_of_urdf(tmp_path / "arm.urdf") == ("the spring of joint 'elbow'", "that link 'hand' has no weight")
+    assert left_out_of_urdf(FILES / "transmissions.urdf") == ()
 
 
 def test_the_pose_of_an_mjcf_is_that_of_the_reference_position(tmp_path: Path) -> None:
