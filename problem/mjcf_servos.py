@@ -8,7 +8,7 @@ import numpy as np
 
 from armlab.common.errors import InputError
 from problem.mjcf_laws import is_joint_drive
-from problem.mjcf_names import joint_name
+from problem.mjcf_names import actuator_name, joint_name
 
 
 def actuators_of(model: Any, joint: int) -> list[int]:
@@ -30,10 +30,12 @@ def reason_no_servo(model: Any, actuator: int) -> str | None:
 
 
 def refuse_other_drives(model: Any, joints: Iterable[int], path: Path) -> None:
-    """Raises InputError for a joint, from 0, whose first actuator is no position servo: no motion alone tells of it."""
+    """Raises InputError for a joint, from 0, that one position servo does not drive: no motion alone tells of it."""
     for joint in joints:
         actuators = actuators_of(model, joint)
         reason = reason_no_servo(model, actuators[0]) if actuators else None
+        if len(actuators) > 1:
+            reason = f"is not alone ({', '.join(actuator_name(model, each) for each in actuators)})"
         if reason is not None:
             raise InputError(
                 f"{path}: the actuator of joint '{joint_name(model, joint)}' {reason}: the recording needs columns of "

@@ -11,6 +11,7 @@ from problem.arm import Arm
 from problem.coupled_joints import chain_motion, torque_at_leaders
 from problem.drive_torque import drive_torque
 from problem.mjcf import arm_of, compile_mjcf, import_mujoco
+from problem.mjcf_laws import is_joint_drive
 from problem.mjcf_names import actuator_name
 from problem.motion import Motion
 from problem.urdf_document import read_urdf_root
@@ -90,8 +91,9 @@ def _left_out(model: Any, with_actuators: bool) -> list[str]:
     out = []
     if model.opt.density or model.opt.viscosity:
         out.append("drag of the medium (density, viscosity)")
-    if model.nu and not with_actuators:
-        out.append(f"forces of the actuators {', '.join(actuator_name(model, each) for each in range(model.nu))}")
+    others = [each for each in range(model.nu) if not (with_actuators and is_joint_drive(model, each))]
+    if others:
+        out.append(f"forces of the actuators {', '.join(actuator_name(model, each) for each in others)}")
     if model.nplugin:
         out.append("plugins")
     return out

@@ -48,7 +48,14 @@ def test_a_stated_controller_replaces_the_actuators_of_the_file(tmp_path: Path, 
     assert (model.nu, model.actuator_gear[0, 0], model.actuator_dyntype[0]) == (1, 1.0, 0)
 
 
-@pytest.mark.parametrize(("drives", "reason"), [(MOTOR, "is a motor, which takes torques"), (FILTERED, "filters its")])
+@pytest.mark.parametrize(
+    ("drives", "reason"),
+    [
+        (MOTOR, "is a motor, which takes torques"),
+        (FILTERED, "filters its"),
+        ('<position name="p" joint="j" kp="9"/><velocity name="v" joint="j" kv="2"/>', "is not alone (p, v)"),
+    ],
+)
 def test_without_a_controller_check_and_diagnosis_refuse_such_actuators_alike(
     tmp_path: Path, drives: str, reason: str
 ) -> None:

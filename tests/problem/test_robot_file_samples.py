@@ -76,6 +76,11 @@ def test_what_is_left_out_of_a_file_is_listed_by_name(tmp_path: Path) -> None:
     assert check_with_mujoco(FILES / "under_water.xml", with_actuators=True).left_out == (
         "drag of the medium (density, viscosity)",
     )
+    finger = FILES / "finger_that_follows.xml"
+    by_tendon = """<tendon><fixed name="t"><joint joint="knuckle" coef="1"/></fixed></tendon>
+<actuator><position name="pull" tendon="t"/><position name="servo" joint="knuckle"/></actuator></mujoco>"""
+    (tmp_path / "arm.xml").write_text(finger.read_text().replace("</mujoco>", by_tendon))
+    assert check_with_mujoco(tmp_path / "arm.xml", with_actuators=True).left_out == ("forces of the actuators pull",)
     gazebo = """<gazebo reference="elbow"><springStiffness>3</springStiffness></gazebo>
 <gazebo reference="hand"><gravity>false</gravity></gazebo></robot>"""
     (tmp_path / "arm.urdf").write_text((FILES / "plain_cobot.urdf").read_text().replace("</robot>", gazebo))
