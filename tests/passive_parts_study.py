@@ -220,7 +220,7 @@ def append_case(path: Path, case: Case) -> None:
     """Adds a row at once, so that a study that is interrupted goes on where it was."""
     is_new = not path.is_file()
     with path.open("a", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(asdict(case)))
+        writer = csv.DictWriter(file, list(asdict(case)), lineterminator="\n")
         if is_new:
             writer.writeheader()
         writer.writerow(asdict(case))

@@ -105,6 +105,9 @@ def main() -> None:
     """Prints the table."""
     with tempfile.TemporaryDirectory() as folder:
         rows = [compare(path, Path(folder)) for path in robot_files()]
+    refused = sum(row.joints is None for row in rows)
+    print("# Robot files as makers write them, beside their simulators\n")
+    print(f"{len(rows)} files, {refused} refused. Difference: the largest of all torques over the largest torque.\n")
     cells = [[row.file, str(row.joints or "–"), row.engine, _format(row.difference), row.refused] for row in rows]
     print(markdown_table(["file", "joints", "engine", "largest difference", "refused"], cells))
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-from passive_parts_study import Case, Sines, judge, simulate, write_arm
+from passive_parts_study import Case, Sines, append_case, judge, read_cases, simulate, write_arm
 
 from problem.drive_torque import drive_torque
 from problem.mjcf import compile_mjcf
@@ -39,3 +39,11 @@ def test_a_simulated_torque_is_that_of_the_arm_away_from_reversals(tmp_path: Pat
     away = np.abs(motion.velocity) > 0.1
     assert arm.joint_laws
     np.testing.assert_allclose(torque[away], drive_torque(arm, motion)[away], atol=1e-9)
+
+
+def test_an_interrupted_study_goes_on_with_the_rows_that_it_has(tmp_path: Path) -> None:
+    made = [case(0, ""), case(1, "coulomb_friction@2", hidden=2), case(1, "", hidden=1, passive=False)]
+    assert read_cases(tmp_path / "rows.csv") == []
+    for each in made:
+        append_case(tmp_path / "rows.csv", each)
+    assert read_cases(tmp_path / "rows.csv") == made
