@@ -1,5 +1,6 @@
 """An arm whose third joint follows its second one: what its file says is the simulation, a finding is a difference."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,9 @@ from refusals import refusal
 from robot_file_table import FILES
 
 from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.result import Diagnosis
+from armlab.identification.model_file import write_model
+from armlab.identification.write_simulator import export_model
 from armlab.recordings.check import check_recording
 from armlab.recordings.load import load_recording
 from armlab.recordings.motion import load_motion_recording
@@ -45,12 +49,25 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_friction_beyond_that_of_a_leader_and_its_follower_is_found_as_a_difference(folder: Path) -> None:
-    found = diagnose(load_recording(folder))
+@pytest.fixture(scope="module")
+def found(folder: Path) -> Diagnosis:
+    return diagnose(load_recording(folder))
+
+
+def test_friction_beyond_that_of_a_leader_and_its_follower_is_found_as_a_difference(found: Diagnosis) -> None:
     assert found.setup is None or not found.setup.findings
     assert [(claim.effect, claim.joint) for claim in found.claims] == [("coulomb_friction", 2)]
     level = found.claims[0].parameters[0]
     assert level.value == pytest.approx(HIDDEN, abs=0.02)
+
+
+def test_nothing_is_missing_in_the_exported_file(folder: Path, found: Diagnosis, tmp_path: Path) -> None:
+    assert found.model is not None
+    write_model(found.model, folder / "model.yaml")
+    shutil.copytree(folder, tmp_path / "again", ignore=shutil.ignore_patterns("arm.xml"))
+    for _ in export_model(folder / "model.yaml", tmp_path / "again" / "arm.xml"):
+        pass
+    assert diagnose(load_recording(tmp_path / "again")).status == "none"
 
 
 def test_the_check_says_which_joint_follows_which(folder: Path) -> None:
