@@ -14,7 +14,7 @@ from problem.coupled_joints import couple_joints
 from problem.mjcf_document import UneditableError
 from problem.mjcf_laws import is_disabled, read_joint_laws, read_rotors
 from problem.mjcf_meshes import text_without_meshes
-from problem.mjcf_names import joint_name, name_all
+from problem.mjcf_names import joint_name, name_joints
 from problem.mjcf_tree import MOVING_KINDS, joints_of_body, mjcf_tree, read_couplings
 from problem.pseudo_inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
 from problem.transforms import inverse, translation, turn_z_to
@@ -54,12 +54,12 @@ def compile_mjcf(path: Path) -> Any:
 def mjcf_spec(path: Path) -> Any:
     """The mujoco.MjSpec of a file that `compile_mjcf` takes, without meshes where some are not at hand.
 
-    Bodies and joints without names get those of `mjcf_names`.
+    Joints without names get those of `joint_name`.
     """
     mujoco = import_mujoco()
     lacks = _lacks_files(path)
     spec = mujoco.MjSpec.from_string(text_without_meshes(path)) if lacks else mujoco.MjSpec.from_file(str(path))
-    name_all(spec)
+    name_joints(spec)
     return spec
 
 

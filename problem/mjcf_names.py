@@ -20,12 +20,11 @@ def actuator_name(model: Any, actuator: int) -> str:
     return str(model.actuator(actuator).name) or f"number {actuator + 1}"
 
 
-def name_all(spec: Any) -> None:
-    """Gives bodies and joints of a mujoco.MjSpec the names that the functions above have for them."""
-    if all(each.name for each in (*spec.joints, *spec.bodies)):
+def name_joints(spec: Any) -> None:
+    """Gives the joints of a mujoco.MjSpec the names that `joint_name` has for them."""
+    if all(each.name for each in spec.joints):
         return
     model = spec.compile()
     names = {each: joint_name(model, int(each.id)) for each in spec.joints}
-    names |= {each: body_name(model, int(each.id)) for each in spec.bodies}
     for each, name in names.items():
         each.name = name
