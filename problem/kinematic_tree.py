@@ -67,7 +67,22 @@ class KinematicTree:
             for name, follows in followers.items():
                 if follows.leader in positions:
                     positions.setdefault(name, follows.multiplier * positions[follows.leader] + follows.offset)
+        if tip is not None:
+            self._refuse_branches_that_move(tip, positions)
         return positions
+
+    def _refuse_branches_that_move(self, tip: str, positions: Mapping[str, float]) -> None:
+        """Raises InputError for a joint beside the way to a link that a joint on the way leads, so nothing holds it."""
+        way = self._way_to(tip)
+        behind = [each for last in self.joints if last.parent == tip for each in self._joints_from(last)]
+        for joint in self.joints:
+            beside = joint.moves and joint not in (*way, *behind)
+            if beside and joint.follows is not None and joint.name not in positions:
+                raise InputError(
+                    f"{self.where}: joint '{joint.name}', beside the way to {tip}, moves with "
+                    f"'{joint.follows.leader}': branches that move with the arm are not supported; "
+                    f"--lock {joint.name}=VALUE holds it still"
+                )
 
     @cached_property
     def ends(self) -> dict[str, int]:

@@ -165,6 +165,18 @@ def test_a_locked_leader_locks_what_follows_it(tmp_path: Path) -> None:
     assert [joint.name for joint in locked.arm.joints] == ["shoulder", "wrist"]
 
 
+def test_a_branch_that_moves_with_the_arm_is_refused_by_name_and_can_be_held_still(tmp_path: Path) -> None:
+    rod = """<link name="rod"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>
+</inertial></link><joint name="rod_joint" type="revolute"><parent link="stage2"/><child link="rod"/>
+<axis xyz="0 1 0"/><mimic joint="shoulder"/></joint></robot>"""
+    path = tmp_path / "arm.urdf"
+    path.write_text((FILES / "telescope_that_mimics.urdf").read_text().replace("</robot>", rod))
+    assert "joint 'rod_joint', beside the way to tool, moves with 'shoulder'" in refusal(
+        lock_joints, path, "tool", {}, tmp_path
+    )
+    assert len(lock_joints(path, "tool", {"rod_joint": 0.1}, tmp_path).arm) == 3
+
+
 def test_excitation_problems_refuse_coupled_joints_by_name(arm: Arm) -> None:
     names = [each.joint.name for each in arm.coupled]
     given: dict[str, object] = dict.fromkeys(
