@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from armlab.diagnosis.diagnose import diagnose
 from passive_parts_study import Sines
 from refusals import refusal
 from robot_file_table import FILES
 
-from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.result import Diagnosis
 from armlab.identification.model_file import write_model
 from armlab.identification.write_simulator import export_model
