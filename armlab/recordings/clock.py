@@ -100,20 +100,27 @@ def part_equal_stamps(run: AnyRun) -> AnyRun:
     tied = np.append(False, np.diff(run.time) <= 0)
     if not tied.any() or run.samples < SMOOTH_LAG:  # so few rows are no run
         return run
+    require_fine_clock(run.file, run.time)
     stamps, counts = np.unique(run.time, return_counts=True)
-    if len(stamps) < run.samples / MAX_ROWS_PER_STAMP:
-        if len(stamps) == 1:
-            raise InputError(f"{run.file}: the time stands still at {stamps[0]:g} s: which column holds the time?")
-        raise InputError(
-            f"{run.file}: {tied.sum()} of {run.samples} rows have the stamp of the row before, the time counts in "
-            f"steps of {np.median(np.diff(stamps)):g} s: which column holds the fraction of seconds? `recording "
-            "import --time SECONDS,NANOSECONDS` takes two"
-        )
     spread = _spread(run, stamps, counts)
     if np.all(np.diff(spread.time) > 0):
         return spread
     even = repair_stamps(run)
     return even if np.all(np.diff(even.time) > 0) else _keep_one_of_each(spread)
+
+
+def require_fine_clock(file: str, time: Array) -> None:
+    """Raises InputError for a clock that stands still most of the time; time: (rows,), s."""
+    stamps = np.unique(time)
+    if len(stamps) >= len(time) / MAX_ROWS_PER_STAMP:
+        return
+    if len(stamps) == 1:
+        raise InputError(f"{file}: the time stands still at {stamps[0]:g} s: which column holds the time?")
+    raise InputError(
+        f"{file}: {len(time) - len(stamps)} of {len(time)} rows have the stamp of the row before, the time counts in "
+        f"steps of {np.median(np.diff(stamps)):g} s: which column holds the fraction of seconds? `recording import "
+        "--time SECONDS,NANOSECONDS` takes two"
+    )
 
 
 def _spread(run: AnyRun, stamps: Array, counts: Rows) -> AnyRun:

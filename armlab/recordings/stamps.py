@@ -86,7 +86,7 @@ def drop_repeated_rows(run: AnyRun) -> AnyRun:
     fresh = run.rows(~again)
     if not again.any() or fresh.samples <= 2 * len(NEIGHBOURS):
         return run
-    grid = _fit_grid(fresh.time, np.arange(fresh.samples))
+    grid = fit_grid(fresh.time, np.arange(fresh.samples))
     even = fresh.with_signals(grid.time, {})
     late = np.abs(grid.lateness).max() > MAX_GRID_LATENESS * grid.step
     if late or not _roughness(even) < MAX_ROUGHNESS_RATIO * _roughness(repair_stamps(run)):
@@ -124,12 +124,13 @@ def fit_even_grid(time: Array) -> Grid:
     steps = np.diff(time)
     usual = float(np.median(steps)) or float(np.mean(steps))
     counted = np.append(0, np.cumsum(np.maximum(1, np.rint(steps / usual)))).astype(np.intp)
-    complete = _fit_grid(time, np.arange(len(time)))
-    with_gaps = _fit_grid(time, counted)
+    complete = fit_grid(time, np.arange(len(time)))
+    with_gaps = fit_grid(time, counted)
     return with_gaps if with_gaps.scatter < MAX_GAP_SCATTER_RATIO * complete.scatter else complete
 
 
-def _fit_grid(time: Array, count: NDArray[np.intp]) -> Grid:
+def fit_grid(time: Array, count: NDArray[np.intp]) -> Grid:
+    """The even grid that fits the stamps best, of samples that stand at these counts of it."""
     middle = count.mean()
     step = float((count - middle) @ (time - time[0]) / np.sum((count - middle) ** 2))
     start = float(np.mean(time - time[0]) - step * middle + time[0])

@@ -43,11 +43,15 @@ def motion_at(time: np.ndarray, seed: int = 0) -> Motion:
     return Motion(position, velocity, acceleration)
 
 
-def frame(seed: int = 0, seconds: float = 8.0, friction: float = 1.0) -> pd.DataFrame:
-    """One run as a table: rigid torque, Coulomb and viscous friction, a little noise."""
+def frame(seed: int = 0, seconds: float = 8.0, friction: float = 1.0, coulomb: float = 1.0) -> pd.DataFrame:
+    """One run as a table: rigid torque, Coulomb and viscous friction, a little noise.
+
+    coulomb: N m, times friction. A torque that jumps between two rows is known to half a row, which intervals of
+    parameters do not contain: 0 for tests that compare numbers with intervals.
+    """
     time = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
     motion = motion_at(time, seed)
-    torque = rigid_body_torque(ARM, motion) + friction * (np.sign(motion.velocity) + 0.5 * motion.velocity)
+    torque = rigid_body_torque(ARM, motion) + friction * (coulomb * np.sign(motion.velocity) + 0.5 * motion.velocity)
     noise = np.random.default_rng(seed).normal(0, 0.02, torque.shape)
     return pd.DataFrame(np.column_stack([time, motion.position, torque + noise]), columns=["t", *POSITION, *TORQUE])
 

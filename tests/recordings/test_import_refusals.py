@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from odd_logs import bag, lists
+from odd_logs import bag, coarse, in_turn, lists, log
 from recording_folders import IMPORT_OPTIONS, POSITION, TORQUE, frame
 from scipy.io import savemat
 
@@ -252,6 +252,8 @@ REFUSALS = (
     Refusal(
         table("log.csv", lambda each: each.assign(nanosec=5e9)), "is no part of a second in ns", {"time": "t,nanosec"}
     ),
+    Refusal(table("log.csv", lambda each: coarse(in_turn(each).drop(range(90, 140)), 70.0)), "rows come unevenly"),
+    Refusal(table("log.csv", lambda _: coarse(in_turn(log()), 100.0)), "torques fit the motion better half a step"),
 )
 
 

@@ -14,6 +14,7 @@ from armlab.recordings.imports.gears import Gear
 from armlab.recordings.imports.packed import PACKED_SUFFIXES
 from armlab.recordings.imports.plan import ImportPlan, plan_import
 from armlab.recordings.imports.questions import Options
+from armlab.recordings.imports.rates import ONE_INSTANT, require_one_instant
 from armlab.recordings.imports.sources import Source
 from armlab.recordings.load import load_recording
 from armlab.recordings.motion import is_motion_only, load_motion_recording
@@ -115,7 +116,7 @@ def write_plan(plan: ImportPlan) -> ImportedRecording:
     copies = plan.robot.copies(folder)
     write_recording(draft, folder, copies)
     try:
-        repairs, useless = _read_written(folder)
+        repairs, useless = _read_written(folder, plan)
     except InputError as error:
         _remove_written(folder, was_there)
         raise InputError(f"nothing is written: {str(error).replace(f'{folder}{os.sep}', '')}") from None
@@ -128,7 +129,7 @@ def _repairs_of(runs: Sequence[MotionRun]) -> tuple[tuple[str, str], ...]:
     return tuple(dict.fromkeys((run.file, finding.text) for run in runs for finding in run.repairs))
 
 
-def _read_written(folder: Path) -> tuple[tuple[tuple[str, str], ...], tuple[str, ...]]:
+def _read_written(folder: Path, plan: ImportPlan) -> tuple[tuple[tuple[str, str], ...], tuple[str, ...]]:
     """What reading repairs, and why nothing can be identified from what was written, if that is so.
 
     Raises InputError for what no command could use, a torque that no joint has among it.
@@ -139,6 +140,8 @@ def _read_written(folder: Path) -> tuple[tuple[tuple[str, str], ...], tuple[str,
     runs = recording.with_role("identify") or recording.runs
     if has_no_torque(runs):
         raise InputError(f"{runs[0].file}: {reason_dead(runs, recording.arm)}")
+    if any(finding.kind == ONE_INSTANT for source in plan.sources.values() for finding in source.table.findings):
+        require_one_instant(runs, recording.arm)
     reason = reason_still(runs) or reason_dead(runs, recording.arm) or reason_copied(recording)
     return _repairs_of(recording.runs), () if reason is None else (reason,)
 

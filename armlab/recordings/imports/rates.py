@@ -3,6 +3,9 @@
 A log of several topics or messages holds cells that are empty in turn. Each column is interpolated between its own
 rows, by a cubic spline if it is smooth, else linearly; over a gap of its own it is not. A line between positions would
 lose part of the motion: a dt^2 / 8 of an acceleration a.
+
+Rows with one stamp are of one instant, unless a signal comes more than once a stamp: the clock is then coarser than the
+rows, which are put on an even grid.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,20 +16,26 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline as _spline
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
-from armlab.recordings.clock import MAX_BRIDGED_GAP
-from armlab.recordings.recording import Finding
+from armlab.common.errors import DataError, InputError
+from armlab.recordings.channels import read_late
+from armlab.recordings.clock import MAX_BRIDGED_GAP, require_fine_clock
+from armlab.recordings.plain_least_squares import fit_plain
+from armlab.recordings.recording import Finding, Run
 from armlab.recordings.repair import (
     BEYOND_LIMITS,
     MAX_LOST_SHARE,
     MAX_USUAL_STEPS,
     USUAL_SHARE,
     USUAL_STEP_SHARE,
+    duplicated_rows,
     find_zero_rows,
 )
+from armlab.recordings.stamps import MAX_GRID_LATENESS, fit_grid
 from armlab.recordings.table import Table
+from problem.arm import Arm
 
 EDGE_ROWS = 2  # of a clock, before and after which the other signal has no row
+ONE_INSTANT = "one_instant"  # of rows with one stamp; the import asks the torques whether it is so
 SMOOTH_SIGNALS = ("position", "link_position", "velocity")
 
 
@@ -60,7 +69,8 @@ def put_on_common_stamps(table: Table, columns: Mapping[str, Sequence[str]], tim
     others = f"; {empty.sum()} rows hold zeros alone, between rows that do not, and are left out" if empty.any() else ""
     others += f"; {odd.sum()} values are far beyond all others and left out" if odd.any() else ""
     stamped = stamped[~empty]
-    time, values = stamps[stamped], values[stamped]
+    again = duplicated_rows([stamps[stamped], values[~empty]])
+    time, values, stamped = stamps[stamped][~again], values[~empty][~again], stamped[~again]
     if np.sum(np.diff(time) < 0) > MAX_LOST_SHARE * len(time):
         raise InputError(
             f"{table.file}: signals stand in rows of their own, and the rows in no order of time: sort them by their "
@@ -71,6 +81,10 @@ def put_on_common_stamps(table: Table, columns: Mapping[str, Sequence[str]], tim
     # of columns that come as rarely, the torque keeps its stamps: positions are smooth, it has noise and steps
     slowest = min(np.flatnonzero(few).tolist(), key=lambda column: wanted[column][0] != "torque")
     clocks = np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) < 0) + 1)
+    findings = list[Finding]()
+    for clock in clocks:
+        time[clock], found = _times_of_rows(table.file, time[clock], np.isfinite(values[clock]), time_factor)
+        findings += [found] if found is not None else []
     orders = [3 if signal in SMOOTH_SIGNALS else 1 for signal, _ in wanted]
     parts = [_interpolate(time, values, clock, slowest, orders) for clock in clocks]
     rows = np.concatenate([part.rows for part in parts])
@@ -84,6 +98,7 @@ def put_on_common_stamps(table: Table, columns: Mapping[str, Sequence[str]], tim
     out = table.values[stamped[rows]].copy()
     places = [table.names.index(name) for _, name in wanted]
     out[:, places] = np.concatenate([part.values for part in parts])
+    out[:, table.names.index(columns["time"][0])] = time[rows]
     lag = np.max([part.lags.max() for part in parts if len(part.rows)]) * time_factor
     most = dict[str, int]()
     for (signal, _), count in zip(wanted, counts.tolist(), strict=True):
@@ -93,13 +108,55 @@ def put_on_common_stamps(table: Table, columns: Mapping[str, Sequence[str]], tim
         f"signals come in rows of their own ({listed} of {len(table.values)} rows): all put on {len(rows)} stamps of "
         f"{slow[1]} by interpolation, from rows up to {1e3 * lag:.3g} ms away on average{others}"
     )
-    finding = Finding("several_rates", "note", text)
-    return replace(
-        table,
-        values=out,
-        row_numbers=table.row_numbers[stamped[rows]],
-        findings=(*table.findings, finding),
-    )
+    known = {finding.text: finding for finding in (*table.findings, Finding("several_rates", "note", text), *findings)}
+    return replace(table, values=out, row_numbers=table.row_numbers[stamped[rows]], findings=tuple(known.values()))
+
+
+def _times_of_rows(
+    file: str, time: Array, known: NDArray[np.bool_], time_factor: float
+) -> tuple[Array, Finding | None]:
+    """When the rows of one clock came, and what is said of it. known: (rows, columns), whether a cell has a number.
+
+    Raises InputError for a clock that is too coarse to tell.
+    """
+    place = np.unique(time, return_inverse=True)[1]
+    tied = 1 - (place[-1] + 1) / len(time)
+    if tied <= MAX_LOST_SHARE:
+        return time, None
+    a_stamp = [column.sum() / len(np.unique(place[column])) for column in known.T if column.any()]
+    if max(a_stamp) <= 1 + MAX_LOST_SHARE:
+        return time, Finding(ONE_INSTANT, "note", "rows of different signals with one stamp are taken as one instant")
+    require_fine_clock(file, time * time_factor)
+    grid = fit_grid(time, np.arange(len(time)))
+    if np.abs(grid.lateness).max() > MAX_GRID_LATENESS * grid.step:
+        raise InputError(
+            f"{file}: the time counts in steps of {time_factor * np.median(np.diff(np.unique(time))):.4g} s, and the "
+            "rows come unevenly, a signal in each: export them with stamps that tell rows apart, or in common rows"
+        )
+    text = f"the clock is coarser than the rows; they are put on an even {1 / grid.step / time_factor:.6g} Hz"
+    return grid.time, Finding("coarse_stamps", "repaired", text)
+
+
+def require_one_instant(runs: Sequence[Run], arm: Arm) -> None:
+    """Raises InputError where torques explain the motion better half a step earlier or later: the clock is too coarse.
+
+    runs: of rows with one stamp that were taken as one instant. Each of three clocks is judged by what plain least
+    squares on the arm leaves of the torque.
+    """
+    fitted = [replace(run, role="identify") for run in runs]
+    step = min(float(np.median(np.diff(run.time))) for run in runs)
+    try:
+        left = [
+            float(np.log(fit_plain(arm, [read_late(run, np.full(run.joints, late)) for run in fitted]).rms).sum())
+            for late in (0.0, step / 2, -step / 2)
+        ]
+    except DataError:
+        return  # too short for a fit, and so for all that asks more of it
+    if left[0] > min(left):
+        raise InputError(
+            f"{runs[0].file}: rows of different signals share stamps, and torques fit the motion better half a step of "
+            f"{1e3 * step:.4g} ms away: the clock is coarser than the rows; export stamps that tell rows apart"
+        )
 
 
 def _far_beyond(values: Array) -> NDArray[np.bool_]:
