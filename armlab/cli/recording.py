@@ -148,9 +148,8 @@ def import_(files: tuple[Path, ...], **options: Any) -> ResultLines:
     from armlab.recordings.imports.sources import read_sources
 
     read = partial(read_sources, progress=tell_progress)
-    plan = fill_in(files, options) if can_ask() else plan_import(files, options, read)
-    imported = write_plan(plan)
+    imported = write_plan(fill_in(files, options) if can_ask() else plan_import(files, options, read))
     yield from imported.lines
-    if plan.options != options:
-        yield f"the same without questions: {command_of(files, plan.options)}"
+    if imported.plan.options != options:
+        yield f"the same without questions: {command_of(files, imported.plan.options)}"
     return imported.document

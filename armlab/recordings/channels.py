@@ -23,8 +23,8 @@ MOTOR_SIDE_SIGNALS = ("position", "velocity", "reference_position", "reference_v
 
 def make_raw_run(table: Table, file: RecordingFile, entry: RunEntry, units: dict[str, tuple[Unit, ...]]) -> Run:
     """The run of a table; values may still be NaN, stamps in any order."""
-    signals = _read_signals(table, file, units)
-    time, notes = _from_first_stamp(signals.pop("time")[:, 0], entry.file)
+    signals, notes = _read_signals(table, file, entry, units)
+    time = signals.pop("time")[:, 0]
     torque = signals.pop("torque" if file.columns.torque else "current")
     findings = (*table.findings, *notes, *report_assumed_units(file))
     run = Run(entry.file, entry.role, time, signals.pop("position"), torque, findings=findings)
@@ -35,23 +35,29 @@ def make_raw_motion_run(
     table: Table, file: RecordingFile, entry: RunEntry, units: dict[str, tuple[Unit, ...]]
 ) -> MotionRun:
     """The run of a table without torque; values may still be NaN, stamps in any order."""
-    signals = _read_signals(table, file, units)
-    time, notes = _from_first_stamp(signals.pop("time")[:, 0], entry.file)
-    position = signals.pop("position")
+    signals, notes = _read_signals(table, file, entry, units)
+    time, position = signals.pop("time")[:, 0], signals.pop("position")
     findings = (*table.findings, *notes, *report_assumed_units(file))
     return MotionRun(entry.file, entry.role, time, position, findings=findings).with_signals(time, signals)
 
 
-def _read_signals(table: Table, file: RecordingFile, units: dict[str, tuple[Unit, ...]]) -> dict[str, Array]:
-    """All signals of a table in SI units, (rows, channels) each."""
-    signals = {}
+def _read_signals(
+    table: Table, file: RecordingFile, entry: RunEntry, units: dict[str, tuple[Unit, ...]]
+) -> tuple[dict[str, Array], tuple[Finding, ...]]:
+    """All signals of a table in SI units, (rows, channels) each, and what is said of its stamps."""
+    signals, notes = dict[str, Array](), tuple[Finding, ...]()
     for name, columns in file.columns.signals().items():
         factors = np.array([unit.factor for unit in units[name]])
         shifts = np.array([unit.shift for unit in units[name]])
         with np.errstate(over="ignore"):
-            values = table.columns(columns, name) * factors + shifts
+            values = table.columns(columns, name)
+            values *= factors
+            values += shifts
+        if name == "time":
+            time, notes = _from_first_stamp(values[:, 0], entry.file)
+            values = time[:, None]
         signals[name] = values
-    return signals
+    return signals, notes
 
 
 MAX_EPOCH_S = 1e10  # the year 2286
@@ -192,9 +198,11 @@ def to_joint_side(run: AnyRun, transmission: Transmission) -> AnyRun:
     the joint side already.
     """
     to_joints = transmission.position.T
-    signals = {"position": run.position @ to_joints + transmission.offset}
+    signals = {"position": run.position @ to_joints}
+    signals["position"] += transmission.offset
     if isinstance(run, Run):
-        signals["torque"] = run.torque * transmission.gains @ transmission.torque.T
+        torque = run.torque if np.all(transmission.gains == 1) else run.torque * transmission.gains
+        signals["torque"] = torque @ transmission.torque.T
     if run.velocity is not None:
         signals["velocity"] = run.velocity @ to_joints
     if run.reference_position is not None:

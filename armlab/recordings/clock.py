@@ -88,7 +88,10 @@ def _is_one_clock(position: Array, time: Array, order: Rows, is_in_order: bool) 
         return bool(not dense and after <= MAX_USUAL_STEPS * step[together].mean())
     lag = np.abs(scaled[order][SMOOTH_LAG:] - scaled[order][:-SMOOTH_LAG]).sum(axis=1)
     is_smooth = len(lag) > 0 and lag.mean() >= MIN_SMOOTH_RATIO * step.mean()
-    return bool(is_smooth and after <= MAX_ROUGHNESS_LEFT * before)
+    forward = np.diff(time[order])
+    blocks = forward[: len(forward) // MIN_PART_SAMPLES * MIN_PART_SAMPLES].reshape(-1, MIN_PART_SAMPLES).mean(axis=1)
+    is_even = len(blocks) > 0 and blocks.min() >= MIN_DENSITY * np.median(blocks)  # else clocks overlap for a while
+    return bool(is_smooth and is_even and after <= MAX_ROUGHNESS_LEFT * before)
 
 
 def part_equal_stamps(run: AnyRun) -> AnyRun:

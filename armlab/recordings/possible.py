@@ -73,7 +73,7 @@ def can_have_torque(joint: Joint, torque: float, drive: float, drive_unit: str |
 
 def position_range(position: Array) -> tuple[Array, Array]:
     """Least and greatest position of each joint without outliers; position: (rows, joints), rows may hold NaN."""
-    low, high = np.nanquantile(position, (OUTLIER_SHARE, 1 - OUTLIER_SHARE), axis=0)
+    low, high = np.transpose([np.nanquantile(own, (OUTLIER_SHARE, 1 - OUTLIER_SHARE)) for own in position.T])
     return low, high
 
 
@@ -86,8 +86,8 @@ def usual_speeds(position: Array, step: float) -> Array:
     block = min(max(rows // 100, 5), MAX_BLOCK_ROWS)
     if rows < max(MIN_ROWS, 2 * block):
         return np.zeros(position.shape[1])
-    moved = np.abs(position[block:] - position[:-block])
-    return np.asarray(np.quantile(moved, 1 - MOVING_SHARE, axis=0) / (block * step))
+    moved = [np.quantile(np.abs(own[block:] - own[:-block]), 1 - MOVING_SHARE) for own in position.T]
+    return np.array(moved) / (block * step)
 
 
 def is_creeping(position: Array, step: float) -> bool:
@@ -98,7 +98,7 @@ def is_creeping(position: Array, step: float) -> bool:
     if len(position) < MIN_ROWS or step <= 1 / SLOWEST_HZ:
         return False
     low, high = position_range(position)
-    fastest = np.quantile(np.abs(np.diff(position, axis=0)), 1 - OUTLIER_SHARE, axis=0) / step
+    fastest = np.array([np.quantile(np.abs(np.diff(own)), 1 - OUTLIER_SHARE) for own in position.T]) / step
     return bool(np.any(high - low > MIN_CREEP_RANGE) and np.all(fastest <= MAX_CREEP))
 
 

@@ -281,9 +281,10 @@ def _write_run(run: DraftRun, wanted: list[str], path: Path) -> None:
         from pyarrow import parquet
 
         schema = arrow.schema([(name, arrow.float64()) for name in wanted])
-        with parquet.ParquetWriter(path, schema) as writer:
+        with parquet.ParquetWriter(path, schema, use_dictionary=False) as writer:
             for piece in pieces:
                 writer.write_table(arrow.table(list(piece.T.copy()), schema=schema))
+        arrow.default_memory_pool().release_unused()
         return
     with path.open("w", encoding="utf-8", newline="") as stream:
         stream.write(pd.DataFrame(columns=wanted).to_csv(index=False, lineterminator="\n"))

@@ -54,13 +54,15 @@ def _required_signals(run: MotionRun) -> dict[str, Array]:
 
 def _is_no_measurement(name: str, values: Array) -> NDArray[np.bool_]:
     """Where values are no numbers or far beyond the usual ones of their column; stamps have no usual size."""
-    size = np.abs(values)
-    with np.errstate(invalid="ignore"):
-        wrong = ~(size < MAX_PLAUSIBLE_VALUE)
-    if name == "time" or not len(values):
-        return np.asarray(wrong)
-    usual = np.quantile(np.where(wrong, 0.0, size), USUAL_SHARE, axis=0)
-    return np.asarray(wrong | (size > np.maximum(BEYOND_USUAL * usual, BEYOND_LEAST)))
+    wrong = np.empty(values.shape, dtype=bool)
+    for place, column in enumerate(values.T):  # of a long run, memory holds one more column
+        size = np.abs(column)
+        wrong[:, place] = ~(size < MAX_PLAUSIBLE_VALUE)
+        if name != "time" and len(size):
+            size[np.isnan(size)] = 0.0
+            usual = np.quantile(np.where(wrong[:, place], 0.0, size), USUAL_SHARE)
+            wrong[:, place] |= size > max(BEYOND_USUAL * usual, BEYOND_LEAST)
+    return wrong
 
 
 def _cause_of_bad_rows(wrong: dict[str, NDArray[np.bool_]], names: dict[str, tuple[str, ...]]) -> str:
@@ -83,7 +85,7 @@ def drop_zero_rows(run: AnyRun) -> AnyRun:
 
     A signal that comes to rest at zero stays: no joint jumps there. Raises InputError where that is more than a tenth.
     """
-    bad = find_zero_rows(np.column_stack([run.signals[name] for name in required_names(run)]))
+    bad = find_zero_rows([column for name in required_names(run) for column in run.signals[name].T])
     if not bad.any():
         return run
     first = f"first at {run.time[bad][0]:g} s"
@@ -93,15 +95,18 @@ def drop_zero_rows(run: AnyRun) -> AnyRun:
     return run.rows(~bad).with_findings(Finding("bad_value", "repaired", f"{text}; left out"))
 
 
-def find_zero_rows(values: Array) -> NDArray[np.bool_]:
-    """Rows that hold zeros alone where a column jumps to zero and back; values: (rows, columns), NaN where empty."""
-    known = np.isfinite(values)
-    zero = np.all((values == 0) | ~known, axis=1) & known.any(axis=1)
-    found = np.zeros(len(values), dtype=bool)
+def find_zero_rows(columns: Sequence[Array]) -> NDArray[np.bool_]:
+    """Rows that hold zeros alone where a column jumps to zero and back; columns: (rows,) each, NaN where empty."""
+    zero, filled = np.ones(len(columns[0]), dtype=bool), np.zeros(len(columns[0]), dtype=bool)
+    for column in columns:
+        zero &= (column == 0) | ~np.isfinite(column)
+        filled |= np.isfinite(column)
+    zero &= filled
+    found = np.zeros(len(zero), dtype=bool)
     if not zero.any() or zero.all():
         return found
-    for column, filled in zip(values.T, known.T, strict=True):
-        own = np.flatnonzero(filled)
+    for column in columns:
+        own = np.flatnonzero(np.isfinite(column))
         there, gone = np.flatnonzero(~zero[own]), np.flatnonzero(zero[own])
         if len(there) < 2 or not len(gone):
             continue
@@ -117,26 +122,22 @@ def drop_rows_beyond_limits(run: AnyRun, joints: Sequence[Joint], transmission: 
 
     Limits that most of the run exceeds are placeholders, or its unit is another one: that is no matter of single rows.
     """
-    found = {"position": run.position @ transmission.position.T + transmission.offset}
-    if isinstance(run, Run):
-        found["torque"] = run.torque * transmission.gains @ transmission.torque.T
-    limits = {
-        "position": np.array([np.abs(joint.limits.position).max() for joint in joints]),
-        "torque": np.array([joint.limits.torque for joint in joints]),
-    }
     bad = np.zeros(run.samples, dtype=bool)
     worst = ""
-    for name, values in found.items():
-        size = np.abs(values)
-        usual = np.quantile(size, 1 - MAX_LOST_SHARE, axis=0)
-        beyond = size > BEYOND_LIMITS * np.maximum(limits[name], usual)
-        if beyond.any() and not worst:
-            row, joint = (int(place) for place in np.argwhere(beyond)[0])
-            worst = (
-                f"{name} of {joints[joint].name} {values[row, joint]:.4g} at {run.time[row]:.4g} s, "
-                f"limit {limits[name][joint]:.4g}"
-            )
-        bad |= beyond.any(axis=1)
+    for name in ("position", "torque") if isinstance(run, Run) else ("position",):
+        for place, joint in enumerate(joints):  # of a long run, memory holds one more column
+            if name == "position":
+                values = run.position @ transmission.position[place] + transmission.offset[place]
+                limit = float(np.abs(joint.limits.position).max())
+            else:
+                values = run.signals["torque"] @ (transmission.gains * transmission.torque[place])
+                limit = joint.limits.torque
+            size = np.abs(values)
+            beyond = size > BEYOND_LIMITS * max(limit, float(np.quantile(size, 1 - MAX_LOST_SHARE)))
+            if beyond.any() and not worst:
+                row = int(np.argmax(beyond))
+                worst = f"{name} of {joint.name} {values[row]:.4g} at {run.time[row]:.4g} s, limit {limit:.4g}"
+            bad |= beyond
     if not bad.any():
         return run
     text = f"{bad.sum()} of {len(bad)} rows are beyond ten times a limit ({worst}); left out"
@@ -162,10 +163,11 @@ def duplicated_rows(signals: Sequence[Array]) -> NDArray[np.bool_]:
     columns = [column for signal in signals for column in (signal[:, None] if signal.ndim == 1 else signal).T]
     keys = np.zeros(len(columns[0]), dtype=np.uint64)
     for column in columns:
-        keys = keys * np.uint64(0x9E3779B97F4A7C15) + pd.util.hash_array(column + 0.0)  # -0.0 equals 0.0
-    suspects = np.flatnonzero(pd.Series(keys).duplicated(keep=False))
+        keys *= np.uint64(0x9E3779B97F4A7C15)
+        keys += pd.util.hash_array(column + 0.0)  # -0.0 equals 0.0
     same = np.zeros(len(keys), dtype=bool)
-    if len(suspects):
+    if np.any(np.diff(np.sort(keys)) == 0):
+        suspects = np.flatnonzero(pd.Series(keys).duplicated(keep=False))
         rows = pd.DataFrame({place: column[suspects] for place, column in enumerate(columns)})
         same[suspects] = rows.duplicated()
     return same

@@ -81,11 +81,12 @@ def drop_repeated_rows(run: AnyRun) -> AnyRun:
     """
     if run.samples <= 2 * len(NEIGHBOURS) or np.any(np.diff(run.time) <= 0):
         return run
-    values = np.column_stack([*run.signals.values()])
-    again = np.append(False, np.all((values[1:] == values[:-1]) | np.isnan(values[1:]), axis=1))
-    fresh = run.rows(~again)
-    if not again.any() or fresh.samples <= 2 * len(NEIGHBOURS):
+    again = np.append(False, np.ones(run.samples - 1, dtype=bool))
+    for column in (own for signal in run.signals.values() for own in signal.T):
+        again[1:] &= (column[1:] == column[:-1]) | np.isnan(column[1:])
+    if not again.any() or run.samples - again.sum() <= 2 * len(NEIGHBOURS):
         return run
+    fresh = run.rows(~again)
     grid = fit_grid(fresh.time, np.arange(fresh.samples))
     even = fresh.with_signals(grid.time, {})
     late = np.abs(grid.lateness).max() > MAX_GRID_LATENESS * grid.step

@@ -101,13 +101,15 @@ def _read_parquet(path: Path) -> Table:
     except ImportError:
         raise InputError(f"{path}: to read Parquet install pyarrow: pip install 'armlab[recordings]'") from None
     try:
-        with parquet.ParquetFile(path) as file:
+        with parquet.ParquetFile(path, pre_buffer=False) as file:
             names = tuple(file.schema_arrow.names)
             rows = file.metadata.num_rows
             values = np.empty((rows, len(names)))
             for place, name in enumerate(names):
-                column = file.read(columns=[name])
+                column = file.read(columns=[name], use_threads=False)
                 values[:, place] = column.columns[0].cast(arrow.float64()).to_numpy(zero_copy_only=False)
+                del column
+                arrow.default_memory_pool().release_unused()
     except (arrow.ArrowException, OSError, IndexError) as error:
         raise InputError(f"cannot read {path} as Parquet: {in_one_line(error)[:200]}") from None
     return Table(path.name, names, values, HEADER_LINES + 1 + np.arange(rows))

@@ -3,9 +3,10 @@
 import codecs
 import csv
 import re
+from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from armlab.recordings.recording import Finding
 
 MAX_TEXT_BYTES = 10 * 10**9  # a text of this size is read for minutes
 NO_NUMBER = ("", "nan", "null", "none", "na", "n/a")  # cells that stand for a number that is missing, in lower case
-PIECE_BYTES, PIECE_LINES = 1 << 20, 20_000
+PIECE_BYTES, PIECE_LINES = 1 << 20, 4_000
 PROGRESS_LINES = 100_000  # from one line of progress to the next
 Progress = Callable[[str], None]
 NumberedLine = tuple[int, str]  # number in the file, from 1, and text with its line end
@@ -111,28 +112,30 @@ def read_rows(lines: Iterable[NumberedLine], layout: RowLayout, where: str) -> R
 
     Raises InputError for a row of the wrong length before the last.
     """
-    parts, kept, findings = list[Rows](), iter(lines), tuple[Finding, ...]()
-    piece = list(islice(kept, PIECE_LINES))
+    kept, findings = iter(lines), tuple[Finding, ...]()
+    values, numbers, words = np.empty((0, layout.width)), array("q"), np.zeros(layout.width, dtype=np.intp)
+    texts: dict[int, list[NDArray[np.generic]]] = {column: [] for column in layout.texts}
+    piece, count = list(islice(kept, PIECE_LINES)), 0
     while piece:
         following = list(islice(kept, PIECE_LINES))
         rows = [(number, line) for number, line in piece if not _is_void(line, layout)]
         if not following:
             rows, findings = _drop_broken_last(rows, layout, where)
-        if rows:
-            parts.append(_parse_piece(rows, layout, where))
         piece = following
-    if not parts:
-        none = np.empty(0, dtype=np.intp)
-        return Rows(np.empty((0, layout.width)), {}, none, np.zeros(layout.width, dtype=np.intp), findings)
-    values, first = np.empty((sum(len(part.numbers) for part in parts), layout.width)), 0
-    for place, part in enumerate(parts):  # each piece goes as soon as it is copied
-        values[first : first + len(part.numbers)] = part.values
-        first += len(part.numbers)
-        parts[place] = replace(part, values=part.values[:0].copy())
-        del part
-    texts = {column: np.concatenate([part.texts[column] for part in parts]) for column in layout.texts}
-    numbers = np.concatenate([part.numbers for part in parts])
-    return Rows(values, texts, numbers, np.sum([part.words for part in parts], axis=0), findings)
+        if not rows:
+            continue
+        part = _parse_piece(rows, layout, where)
+        if count + len(part.values) > len(values):  # in place, where numbers that were copied would stand twice
+            values.resize((count + len(part.values) + len(values) // 8, layout.width), refcheck=False)
+        values[count : count + len(part.values)] = part.values
+        count += len(part.values)
+        numbers.frombytes(part.numbers.astype(np.int64).tobytes())
+        words += part.words
+        for column, cells in texts.items():
+            cells.append(part.texts[column])
+    values.resize((count, layout.width), refcheck=False)
+    joined = {column: np.concatenate(cells) for column, cells in texts.items() if cells}
+    return Rows(values, joined, np.frombuffer(numbers, dtype=np.int64).astype(np.intp, copy=False), words, findings)
 
 
 def _is_void(line: str, layout: RowLayout) -> bool:

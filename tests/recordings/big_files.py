@@ -31,8 +31,7 @@ options = dict.fromkeys((*names, "torque", "reference_position", "command_topic"
 options |= {"robot": "irb120-arm", "lock": (), "validate": (), "units": (), "out": Path(sys.argv[2])}
 told = []
 before, started = memory(), time.monotonic()
-plan = plan_import([Path(sys.argv[1])], options, partial(read_sources, progress=told.append))
-files.write_plan(plan)
+files.write_plan(plan_import([Path(sys.argv[1])], options, partial(read_sources, progress=told.append)))
 print(f"MEASURED {time.monotonic() - started:.1f} {memory() - before} {len(told)}", file=sys.stderr)
 """
 

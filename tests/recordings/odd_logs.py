@@ -338,7 +338,7 @@ FROM_LOGS = (
     OddLog(
         "the same, with a clock that is coarser than the rows",
         csv("log.csv", lambda table: coarse(in_turn(table), 70.0)),
-        "the clock is coarser than the rows; they are put on an even 200 Hz",
+        "stamps stray from the even 200 Hz that the motion shows; rows put there",
     ),
     OddLog(
         "the same, with one stamp for each two rows",

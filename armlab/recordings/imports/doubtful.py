@@ -10,7 +10,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.recordings.imports.gears import Gear
-from armlab.recordings.imports.numbers import POSITION_SIGNALS, Numbers, Units, units_per_joint
+from armlab.recordings.imports.numbers import POSITION_SIGNALS, Numbers, Units, torque_peaks, units_per_joint
 from armlab.recordings.possible import OUTLIER_SHARE, has_usual_position, position_range
 from armlab.recordings.units import DRIVE_UNITS, SIGNAL_QUANTITIES
 from problem.arm import Arm
@@ -80,7 +80,7 @@ def _doubt_torque(
         return None
     names = units_per_joint(units["torque"], joints)
     factors = np.array([known[name].factor for name in names])
-    raw = np.max([np.quantile(np.abs(each.signals["torque"]), 1 - OUTLIER_SHARE, axis=0) for each in numbers], axis=0)
+    raw = np.max([torque_peaks(each) for each in numbers], axis=0)
     if not np.any(raw > 0):
         return None
     measured = factors * raw / np.abs(np.array(numbers[0].ratios["torque"]))

@@ -15,6 +15,7 @@ from armlab.recordings.imports.packed import PACKED_SUFFIXES
 from armlab.recordings.imports.plan import ImportPlan, plan_import
 from armlab.recordings.imports.questions import Options
 from armlab.recordings.imports.rates import ONE_INSTANT, require_one_instant
+from armlab.recordings.imports.robots import ImportedRobot
 from armlab.recordings.imports.sources import Source
 from armlab.recordings.load import load_recording
 from armlab.recordings.motion import is_motion_only, load_motion_recording
@@ -28,54 +29,16 @@ MAX_LISTED_COLUMNS = 3  # of a signal; of more, numbered in a row, the first and
 
 @dataclass(frozen=True, eq=False)
 class ImportedRecording:
-    """A recording that was written. whole_robot: the file of the whole robot, where joints are locked.
+    """A recording that was written. plan: without the content of the files.
 
-    repairs: what reading the runs repairs, in words, by the file.
+    lines: how each file was read, what each signal was taken from, what was repaired, and what to do next. document:
+    the same for programs.
     """
 
     folder: Path
     plan: ImportPlan
-    draft: Draft
-    whole_robot: Path | None
-    repairs: tuple[tuple[str, str], ...] = ()
-
-    @property
-    def lines(self) -> list[str]:
-        """How each file was read, what each signal was taken from, and what to do next."""
-        whole = f"{self.whole_robot}: the whole robot, for `armlab model export`"
-        return [
-            *(f"{name}: {text}" for name, text in describe_plan(self.plan)),
-            *(f"{file}: repaired: {text}" for file, text in self.repairs),
-            *([whole] if self.whole_robot else []),
-            f"{self.folder}: written; `armlab recording check {self.folder}` examines it",
-        ]
-
-    @property
-    def document(self) -> Document:
-        """The same for programs."""
-        runs = zip(self.draft.runs, self.plan.sources.items(), strict=True)
-        return {
-            "recording": self.folder,
-            "robot": self.draft.robot,
-            "whole_robot": self.whole_robot,
-            "runs": [
-                {
-                    "file": run.file,
-                    "role": run.role,
-                    "rows": len(source.table.values),
-                    "from": path,
-                    "read_as": source.note,
-                    "findings": [each.text for each in source.table.findings],
-                    "empty_columns": source.table.empty,
-                }
-                for run, (path, source) in runs
-            ],
-            "columns": self.plan.columns,
-            "units": self.plan.units,
-            "reasons": {"columns": self.plan.column_reasons, "units": self.plan.unit_reasons},
-            "doubts": self.plan.doubts,
-            "repairs": [{"file": file, "text": text} for file, text in self.repairs],
-        }
+    lines: tuple[str, ...]
+    document: Document
 
 
 def import_files(files: Sequence[Path], out: Path, options: Options) -> ImportedRecording:
@@ -95,6 +58,40 @@ def write_plan(plan: ImportPlan) -> ImportedRecording:
     """
     if plan.questions or plan.robot is None:
         raise InputError("; ".join(question.missing for question in plan.questions))
+    draft = _draft_of(plan, plan.robot)
+    folder = Path(plan.options["out"])
+    was_there = folder.is_dir()
+    copies = plan.robot.copies(folder)
+    whole = folder / plan.robot.whole_name if plan.robot.whole_name in copies else None
+    described, document = describe_plan(plan), _describe_runs(plan, draft)
+    shares_stamps = any(each.kind == ONE_INSTANT for source in plan.sources.values() for each in source.table.findings)
+    write_recording(draft, folder, copies)
+    plan = replace(plan, sources={})  # with the runs of the draft, as much memory as what is read now
+    del draft
+    try:
+        repairs, useless = _read_written(folder, shares_stamps)
+    except InputError as error:
+        _remove_written(folder, was_there)
+        raise InputError(f"nothing is written: {str(error).replace(f'{folder}{os.sep}', '')}") from None
+    plan = replace(plan, doubts=(*plan.doubts, *useless))
+    lines = (
+        *(f"{name}: {text}" for name, text in (*described, *(("doubtful", text) for text in useless))),
+        *(f"{file}: repaired: {text}" for file, text in repairs),
+        *([f"{whole}: the whole robot, for `armlab model export`"] if whole else []),
+        f"{folder}: written; `armlab recording check {folder}` examines it",
+    )
+    said = {
+        "recording": folder,
+        "whole_robot": whole,
+        **document,
+        "doubts": plan.doubts,
+        "repairs": [{"file": file, "text": text} for file, text in repairs],
+    }
+    return ImportedRecording(folder, plan, lines, said)
+
+
+def _draft_of(plan: ImportPlan, robot: ImportedRobot) -> Draft:
+    """What is to be written."""
     validate = {str(path) for path in plan.options["validate"]}
     wanted = tuple(name for names in plan.columns.values() for name in names)
     runs = []
@@ -110,18 +107,30 @@ def write_plan(plan: ImportPlan) -> ImportedRecording:
         **({"joints": list(plan.joints)} if plan.joints else {}),
     }
     note = tuple(f"{run.file}: imported from {Path(path).name}" for path, run in zip(plan.sources, runs, strict=True))
-    draft = Draft(plan.robot.name, columns, dict(plan.units), tuple(runs), others, note)
-    folder = Path(plan.options["out"])
-    was_there = folder.is_dir()
-    copies = plan.robot.copies(folder)
-    write_recording(draft, folder, copies)
-    try:
-        repairs, useless = _read_written(folder, plan)
-    except InputError as error:
-        _remove_written(folder, was_there)
-        raise InputError(f"nothing is written: {str(error).replace(f'{folder}{os.sep}', '')}") from None
-    whole = folder / plan.robot.whole_name if plan.robot.whole_name in copies else None
-    return ImportedRecording(folder, replace(plan, doubts=(*plan.doubts, *useless)), draft, whole, repairs)
+    return Draft(robot.name, columns, dict(plan.units), tuple(runs), others, note)
+
+
+def _describe_runs(plan: ImportPlan, draft: Draft) -> Document:
+    """For programs: how each file was read, what each signal was taken from, and why."""
+    runs = zip(draft.runs, plan.sources.items(), strict=True)
+    return {
+        "robot": draft.robot,
+        "runs": [
+            {
+                "file": run.file,
+                "role": run.role,
+                "rows": len(source.table.values),
+                "from": path,
+                "read_as": source.note,
+                "findings": [each.text for each in source.table.findings],
+                "empty_columns": source.table.empty,
+            }
+            for run, (path, source) in runs
+        ],
+        "columns": plan.columns,
+        "units": plan.units,
+        "reasons": {"columns": plan.column_reasons, "units": plan.unit_reasons},
+    }
 
 
 def _repairs_of(runs: Sequence[MotionRun]) -> tuple[tuple[str, str], ...]:
@@ -129,9 +138,10 @@ def _repairs_of(runs: Sequence[MotionRun]) -> tuple[tuple[str, str], ...]:
     return tuple(dict.fromkeys((run.file, finding.text) for run in runs for finding in run.repairs))
 
 
-def _read_written(folder: Path, plan: ImportPlan) -> tuple[tuple[tuple[str, str], ...], tuple[str, ...]]:
+def _read_written(folder: Path, shares_stamps: bool) -> tuple[tuple[tuple[str, str], ...], tuple[str, ...]]:
     """What reading repairs, and why nothing can be identified from what was written, if that is so.
 
+    shares_stamps: whether rows of different signals were taken as one instant.
     Raises InputError for what no command could use, a torque that no joint has among it.
     """
     if is_motion_only(folder):
@@ -140,7 +150,7 @@ def _read_written(folder: Path, plan: ImportPlan) -> tuple[tuple[tuple[str, str]
     runs = recording.with_role("identify") or recording.runs
     if has_no_torque(runs):
         raise InputError(f"{runs[0].file}: {reason_dead(runs, recording.arm)}")
-    if any(finding.kind == ONE_INSTANT for source in plan.sources.values() for finding in source.table.findings):
+    if shares_stamps:
         require_one_instant(runs, recording.arm)
     reason = reason_still(runs) or reason_dead(runs, recording.arm) or reason_copied(recording)
     return _repairs_of(recording.runs), () if reason is None else (reason,)

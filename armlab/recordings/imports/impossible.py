@@ -8,12 +8,11 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.recordings.imports.doubtful import SMALL_RANGE
-from armlab.recordings.imports.numbers import POSITION_SIGNALS, Numbers, Units, units_per_joint
+from armlab.recordings.imports.numbers import POSITION_SIGNALS, Numbers, Units, torque_peaks, units_per_joint
 from armlab.recordings.imports.proposals import propose_unit
 from armlab.recordings.imports.questions import Question
 from armlab.recordings.imports.recognition import RATES_HZ
 from armlab.recordings.possible import (
-    OUTLIER_SHARE,
     TURN,
     can_have_position,
     can_have_speed,
@@ -197,7 +196,7 @@ def _judge_torque(numbers: Numbers, unit: str | tuple[str, ...], gains: Sequence
     names, quantity = units_per_joint(unit, numbers.joints), SIGNAL_QUANTITIES["torque"]
     if gains is None and any(name in DRIVE_UNITS for name in names):
         return None
-    peaks = np.nanquantile(np.abs(numbers.signals["torque"]), 1 - OUTLIER_SHARE, axis=0)
+    peaks = torque_peaks(numbers)
     scales, ratios = np.abs(gains or (1.0,) * len(names)), np.abs(numbers.ratios["torque"])
 
     def is_possible(place: int, factor: float) -> bool:

@@ -65,7 +65,9 @@ def _read_file(
     needed = [np.isfinite(values).all(axis=1) for name, values in signals.items() if name != "velocity"]
     whole = np.isfinite(time) & np.all(needed, axis=0)
     if not whole.all():
-        time, signals = time[whole], {name: values[whole] for name, values in signals.items()}
+        time = time[whole]
+        for name in wanted:  # one after the other, so that memory holds them once
+            signals[name] = signals[name][whole]
     rises = np.diff(time)
     if not np.any(rises > 0):
         return None
@@ -73,6 +75,11 @@ def _read_file(
     first, last = np.quantile(time, (OUTLIER_SHARE, 1 - OUTLIER_SHARE))
     mean = float(last - first) / ((1 - 2 * OUTLIER_SHARE) * len(rises)) or median
     return Numbers(path, joints, ratios, time, signals, max(median, mean), min(median, mean))
+
+
+def torque_peaks(numbers: Numbers) -> Array:
+    """The largest torque of each joint without outliers, (joints,), in the units of the file."""
+    return np.array([np.quantile(np.abs(own), 1 - OUTLIER_SHARE) for own in numbers.signals["torque"].T])
 
 
 def units_per_joint(unit: str | tuple[str, ...], joints: tuple[Joint, ...]) -> tuple[str, ...]:

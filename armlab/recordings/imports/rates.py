@@ -4,8 +4,8 @@ A log of several topics or messages holds cells that are empty in turn. Each col
 rows, by a cubic spline if it is smooth, else linearly; over a gap of its own it is not. A line between positions would
 lose part of the motion: a dt^2 / 8 of an acceleration a.
 
-Rows with one stamp are of one instant, unless a signal comes more than once a stamp: the clock is then coarser than the
-rows, which are put on an even grid.
+Rows with one stamp are of one instant where all signals share it. Elsewhere a clock may be coarser than the rows: they
+are put on an even grid that fits, unless the motion shows that they came when their stamps say.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,9 +18,9 @@ from scipy.interpolate import make_interp_spline as _spline
 from armlab.common.arrays import Array
 from armlab.common.errors import DataError, InputError
 from armlab.recordings.channels import read_late
-from armlab.recordings.clock import MAX_BRIDGED_GAP, require_fine_clock
+from armlab.recordings.clock import MAX_BRIDGED_GAP, SMOOTH_LAG, require_fine_clock
 from armlab.recordings.plain_least_squares import fit_plain
-from armlab.recordings.recording import Finding, Run
+from armlab.recordings.recording import Finding, MotionRun, Run
 from armlab.recordings.repair import (
     BEYOND_LIMITS,
     MAX_LOST_SHARE,
@@ -30,7 +30,13 @@ from armlab.recordings.repair import (
     duplicated_rows,
     find_zero_rows,
 )
-from armlab.recordings.stamps import MAX_GRID_LATENESS, fit_grid
+from armlab.recordings.stamps import (
+    MAX_GRID_LATENESS,
+    MAX_ROUNDING_LATENESS,
+    Grid,
+    fit_grid,
+    is_sampled_unevenly,
+)
 from armlab.recordings.table import Table
 from problem.arm import Arm
 
@@ -65,7 +71,7 @@ def put_on_common_stamps(table: Table, columns: Mapping[str, Sequence[str]], tim
     stamped = np.flatnonzero(np.isfinite(stamps))
     odd = _far_beyond(values)
     values[odd] = np.nan
-    empty = find_zero_rows(values[stamped])
+    empty = find_zero_rows(list(values[stamped].T))
     others = f"; {empty.sum()} rows hold zeros alone, between rows that do not, and are left out" if empty.any() else ""
     others += f"; {odd.sum()} values are far beyond all others and left out" if odd.any() else ""
     stamped = stamped[~empty]
@@ -82,8 +88,11 @@ def put_on_common_stamps(table: Table, columns: Mapping[str, Sequence[str]], tim
     slowest = min(np.flatnonzero(few).tolist(), key=lambda column: wanted[column][0] != "torque")
     clocks = np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) < 0) + 1)
     findings = list[Finding]()
+    position = [place for place, (signal, _) in enumerate(wanted) if signal == "position"]
     for clock in clocks:
-        time[clock], found = _times_of_rows(table.file, time[clock], np.isfinite(values[clock]), time_factor)
+        run = MotionRun(table.file, "identify", time[clock] * time_factor, values[clock][:, position])
+        own, found = _times_of_rows(run, np.isfinite(values[clock]), slowest)
+        time[clock] = own / time_factor if found is not None else time[clock]
         findings += [found] if found is not None else []
     orders = [3 if signal in SMOOTH_SIGNALS else 1 for signal, _ in wanted]
     parts = [_interpolate(time, values, clock, slowest, orders) for clock in clocks]
@@ -112,29 +121,34 @@ def put_on_common_stamps(table: Table, columns: Mapping[str, Sequence[str]], tim
     return replace(table, values=out, row_numbers=table.row_numbers[stamped[rows]], findings=tuple(known.values()))
 
 
-def _times_of_rows(
-    file: str, time: Array, known: NDArray[np.bool_], time_factor: float
-) -> tuple[Array, Finding | None]:
-    """When the rows of one clock came, and what is said of it. known: (rows, columns), whether a cell has a number.
+def _times_of_rows(run: MotionRun, known: NDArray[np.bool_], slowest: int) -> tuple[Array, Finding | None]:
+    """When the rows of one clock came, s, and what is said of it.
 
-    Raises InputError for a clock that is too coarse to tell.
+    run: position is NaN in rows of other signals. known: (rows, columns), whether a cell has a number. slowest: the
+    column that sets the stamps. Raises InputError for a clock that is too coarse to tell.
     """
-    place = np.unique(time, return_inverse=True)[1]
-    tied = 1 - (place[-1] + 1) / len(time)
-    if tied <= MAX_LOST_SHARE:
-        return time, None
-    a_stamp = [column.sum() / len(np.unique(place[column])) for column in known.T if column.any()]
-    if max(a_stamp) <= 1 + MAX_LOST_SHARE:
-        return time, Finding(ONE_INSTANT, "note", "rows of different signals with one stamp are taken as one instant")
-    require_fine_clock(file, time * time_factor)
-    grid = fit_grid(time, np.arange(len(time)))
-    if np.abs(grid.lateness).max() > MAX_GRID_LATENESS * grid.step:
+    whole = np.flatnonzero(np.isfinite(run.position).all(axis=1))
+    if len(whole) < SMOOTH_LAG:  # so few rows are no run
+        return run.time, None
+    place = np.unique(run.time, return_inverse=True)[1]
+    shared = np.all([np.isin(place[known[:, slowest]], place[column]) for column in known.T], axis=0)
+    once = [len(np.unique(place[column])) >= (1 - MAX_LOST_SHARE) * column.sum() for column in known.T]
+    if all(once) and np.mean(shared) >= 1 - MAX_LOST_SHARE:
+        text = "rows of different signals with one stamp are taken as one instant"
+        return run.time, Finding(ONE_INSTANT, "note", text)
+    require_fine_clock(run.file, run.time)
+    grid = fit_grid(run.time, np.arange(run.samples))
+    worst = float(np.abs(grid.lateness).max() / grid.step)
+    own = Grid(grid.start, grid.step, grid.count[whole], grid.lateness[whole])
+    if MAX_ROUNDING_LATENESS < worst <= MAX_GRID_LATENESS and not is_sampled_unevenly(run.rows(whole), own):
+        text = f"stamps stray from the even {1 / grid.step:.6g} Hz that the motion shows; rows put there"
+        return grid.time, Finding("coarse_stamps", "repaired", text)
+    if worst > MAX_GRID_LATENESS and place[-1] + 1 < (1 - MAX_LOST_SHARE) * run.samples:
         raise InputError(
-            f"{file}: the time counts in steps of {time_factor * np.median(np.diff(np.unique(time))):.4g} s, and the "
-            "rows come unevenly, a signal in each: export them with stamps that tell rows apart, or in common rows"
+            f"{run.file}: the time counts in steps of {np.median(np.diff(np.unique(run.time))):.4g} s, and the rows "
+            "come unevenly, a signal in each: export them with stamps that tell rows apart, or in common rows"
         )
-    text = f"the clock is coarser than the rows; they are put on an even {1 / grid.step / time_factor:.6g} Hz"
-    return grid.time, Finding("coarse_stamps", "repaired", text)
+    return run.time, None
 
 
 def require_one_instant(runs: Sequence[Run], arm: Arm) -> None:
