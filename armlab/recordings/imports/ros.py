@@ -51,16 +51,21 @@ BAG_READ_ERRORS = (
 class Series:
     """The messages of one topic as they were recorded.
 
-    times: (messages,), ns; values: (messages, names), NaN where a message leaves one out. delay: how much later than
-    stamped the messages were recorded, the median, ns; None without stamps. foreign: messages without a joint of the
-    robot, which are left out.
+    times: (messages,), ns; rows: (messages, 1 + names), stamps in s from the first one, and values, NaN where a message
+    leaves one out. delay: how much later than stamped the messages were recorded, the median, ns; None without stamps.
+    foreign: messages without a joint of the robot, which are left out.
     """
 
     names: tuple[str, ...]
     times: NDArray[np.int64]
-    values: Array
+    rows: Array
     delay: int | None
     foreign: int = 0
+
+    @property
+    def values(self) -> Array:
+        """(messages, names)."""
+        return self.rows[:, 1:]
 
 
 def read_bag(
@@ -87,7 +92,7 @@ def read_bag(
         if series.foreign:
             text = f"{series.foreign} messages hold no joint of the robot, such as a gripper's, and are left out"
             findings.append(Finding("foreign_messages", "note", text))
-    names, columns, known = list(first.names), [first.values], np.ones(len(first.times), dtype=bool)
+    names, columns, known = list(first.names), [first.rows], np.ones(len(first.times), dtype=bool)
     for other in states[1:]:
         columns.append(_on_times(other, first.times))
         names += other.names
@@ -103,7 +108,8 @@ def read_bag(
             f"{int((~known).sum())} of {len(known)} states are left out: not all joints and commands had come by then"
         )
         findings.append(Finding("incomplete_states", "note", text))
-    table = np.column_stack([(first.times - first.times[0]) / 1e9, *columns])[known]
+    table = first.rows if len(columns) == 1 else np.column_stack(columns)
+    table = table if known.all() else table[known]
     return Table(path.name, ("t", *names), table, 1 + np.flatnonzero(known), tuple(findings))
 
 
@@ -173,7 +179,10 @@ def _check_topic(reader: Any, wanted: str, types: Sequence[str], what: str, path
 
 @dataclass(frozen=True, eq=False)
 class _Kind:
-    """Messages of one topic that hold the same names. values: one after the other; places: of the messages."""
+    """Messages of one topic that hold the same names. places: of the messages.
+
+    values: one after the other, each with a place for its stamp: of a large bag, no second table is made.
+    """
 
     of_robot: bool
     values: "array[float]" = field(default_factory=lambda: array("d"))
@@ -192,35 +201,41 @@ def _read_topic(reader: Any, topic: str, parse: Parser, joints: Sequence[str], p
         names = tuple(numbers)
         if names not in kinds:
             kinds[names] = _Kind(any(name.endswith(f"_{joint}") for name in names for joint in joints))
+        kinds[names].values.append(0.0)
         kinds[names].values.extend(numbers.values())
         kinds[names].places.append(place)
         recorded.append(time)
         stamps.append(stamp_of(message))
     own = {names: kind for names, kind in kinds.items() if kind.of_robot} or kinds  # else listed by hand
     names = tuple(dict.fromkeys(name for held in own for name in held))
-    values, of_robot = np.full((len(recorded), len(names)), np.nan), np.zeros(len(recorded), dtype=bool)
-    for held, kind in own.items():
-        places = np.frombuffer(kind.places, dtype=np.int64)
-        columns = [names.index(name) for name in held]
-        values[places[:, None], columns] = np.frombuffer(kind.values).reshape(len(places), len(held))
-        of_robot[places] = True
-    written, headers = np.array(recorded, dtype=np.int64), np.array(stamps, dtype=np.int64)
+    written, headers = np.frombuffer(recorded, dtype=np.int64), np.frombuffer(stamps, dtype=np.int64)
+    foreign = len(recorded) - sum(len(kind.places) for kind in own.values())
+    if len(own) == 1 and not foreign:
+        rows = np.frombuffer(own[names].values).reshape(len(recorded), 1 + len(names))
+    else:
+        rows, of_robot = np.full((len(recorded), 1 + len(names)), np.nan), np.zeros(len(recorded), dtype=bool)
+        for held, kind in own.items():
+            places = np.frombuffer(kind.places, dtype=np.int64)
+            columns = [0, *(1 + names.index(name) for name in held)]
+            rows[places[:, None], columns] = np.frombuffer(kind.values).reshape(len(places), 1 + len(held))
+            of_robot[places] = True
+        written, headers, rows = written[of_robot], headers[of_robot], rows[of_robot]
     stamped = bool(len(headers)) and bool(np.any(headers != headers[0]))
     delay = int(np.median(written - headers)) if stamped else None
-    if not of_robot.all():
-        written, headers, values = written[of_robot], headers[of_robot], values[of_robot]
-    times, joined = _join_messages(headers if stamped else written, values)
-    return Series(names, times, joined, delay, int((~of_robot).sum()))
+    times, rows = _join_messages(headers if stamped else written, rows)
+    if len(times):
+        rows[:, 0] = (times - times[0]) / 1e9
+    return Series(names, times, rows, delay, foreign)
 
 
-def _join_messages(times: NDArray[np.int64], values: Array) -> tuple[NDArray[np.int64], Array]:
-    """One row for messages in a row with one stamp that hold different joints."""
-    if not np.isnan(values).any():
-        return times, values
-    joined = values.copy()
+def _join_messages(times: NDArray[np.int64], rows: Array) -> tuple[NDArray[np.int64], Array]:
+    """One row for messages in a row with one stamp that hold different joints; rows: as of `Series`."""
+    if not np.isnan(rows).any():
+        return times, rows
+    joined = rows.copy()
     first = np.ones(len(times), dtype=bool)
     for row in np.flatnonzero(np.diff(times) == 0) + 1:
-        if np.all(np.isnan(joined[row - 1]) | np.isnan(joined[row])):
+        if np.all(np.isnan(joined[row - 1, 1:]) | np.isnan(joined[row, 1:])):
             joined[row] = np.where(np.isnan(joined[row]), joined[row - 1], joined[row])
             first[row - 1] = False
     return times[first], joined[first]
