@@ -96,7 +96,10 @@ def drop_zero_rows(run: AnyRun) -> AnyRun:
 
 
 def find_zero_rows(columns: Sequence[Array]) -> NDArray[np.bool_]:
-    """Rows that hold zeros alone where a column jumps to zero and back; columns: (rows,) each, NaN where empty."""
+    """Rows that hold zeros alone where a column jumps to zero and back; columns: (rows,) each, NaN where empty.
+
+    Where there are such rows, stretches of zeros that are no longer are of their kind, too: no column has to jump.
+    """
     zero, filled = np.ones(len(columns[0]), dtype=bool), np.zeros(len(columns[0]), dtype=bool)
     for column in columns:
         zero &= (column == 0) | ~np.isfinite(column)
@@ -114,6 +117,11 @@ def find_zero_rows(columns: Sequence[Array]) -> NDArray[np.bool_]:
         usual = np.quantile(np.abs(np.diff(signal)), USUAL_STEP_SHARE)
         after = np.clip(np.searchsorted(there, gone), 1, len(there) - 1)
         found[own[gone]] |= np.minimum(np.abs(signal[after - 1]), np.abs(signal[after])) > MAX_USUAL_STEPS * usual
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], zero, [False]])))
+    stretches = [slice(start, end) for start, end in ends.reshape(-1, 2).tolist()]
+    longest = max((each.stop - each.start for each in stretches if found[each].any()), default=0)
+    for each in stretches:
+        found[each] |= each.stop - each.start <= longest
     return found
 
 

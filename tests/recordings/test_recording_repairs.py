@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from recording_folders import POSITION, RATE_HZ, SETTINGS, folder_with, frame, motion_at
+from recording_folders import POSITION, RATE_HZ, SETTINGS, TORQUE, folder_with, frame, motion_at
 from refusals import refusal
 
 from armlab.common.errors import InputError
@@ -301,6 +301,15 @@ def test_rows_of_zeros_between_rows_of_motion_are_left_out_and_counted(tmp_path:
     assert kinds(run) == [("bad_value", "repaired")]
     assert f"{len(zeros)} of {len(table) + len(zeros)} rows hold zeros alone" in run.findings[0].text
     assert_array_equal(run.position, table[POSITION])
+
+
+def test_a_row_of_zeros_is_left_out_where_no_column_jumps_to_it_if_others_do(tmp_path: Path) -> None:
+    table = frame()
+    near = table[[*POSITION, *TORQUE]].abs().sum(axis=1).idxmin()
+    table.loc[near, [*POSITION, *TORQUE]] = table.loc[[near - 1, near + 1], [*POSITION, *TORQUE]] = 1e-4
+    table.loc[[near, *range(15, len(table), 40)], [*POSITION, *TORQUE]] = 0.0
+    (run,) = loaded(tmp_path, table)
+    assert not np.any(np.all(run.position == 0, axis=1))
 
 
 def test_a_log_that_starts_and_ends_in_zeros_keeps_them(tmp_path: Path) -> None:
