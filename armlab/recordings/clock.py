@@ -184,7 +184,7 @@ def cut_at_jumps(run: AnyRun, exclude: Sequence[tuple[float, float]]) -> tuple[A
     chosen = np.zeros(len(breaks), dtype=bool)
     for start, end in exclude:
         chosen |= (run.time[breaks] < end) & (run.time[breaks + 1] > start)
-    leaps = breaks[~jumps[breaks] & (steps[breaks] > 0) & ~chosen]
+    leaps = breaks[~jumps[breaks] & (steps[breaks] > 0) & ~chosen & _goes_on(run, breaks, usual)]
     if len(leaps):
         excess = np.zeros(run.samples)
         excess[leaps + 1] = steps[leaps] - usual
@@ -201,6 +201,22 @@ def cut_at_jumps(run: AnyRun, exclude: Sequence[tuple[float, float]]) -> tuple[A
     text = f"{len(cuts)} gap(s), {first}; cut into {len(cuts) + 1} parts"
     run = run.with_findings(Finding("time_gap", "repaired", text))
     return tuple(run.rows(piece) for piece in np.split(np.arange(run.samples), cuts + 1))
+
+
+def _goes_on(run: MotionRun, places: Rows, usual: float) -> NDArray[np.bool_]:
+    """Whether joints moved over long steps, after these places, as in one usual step, and not as in all that time."""
+    last = run.samples - 1
+    before = [np.maximum(places - 2, 0), places]
+    after = [places + 1, np.minimum(places + 3, last)]
+    time, position = run.time[:, None], run.position
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slopes = [
+            np.nan_to_num(np.diff(position[each], axis=0) / np.diff(time[each], axis=0))[0] for each in (before, after)
+        ]
+    slope, scale = np.mean(slopes, axis=0), np.maximum(np.ptp(position, axis=0), np.finfo(float).tiny)
+    moved, step = position[places + 1] - position[places], run.time[places + 1] - run.time[places]
+    off = [np.abs((moved - slope * each) / scale).sum(axis=1) for each in (usual, step[:, None])]
+    return np.asarray(off[0] < off[1])
 
 
 def _long_steps(time: Array) -> Rows:

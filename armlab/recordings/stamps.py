@@ -104,20 +104,23 @@ def _roughness(run: MotionRun) -> float:
 
     Few rows that are far off do not count: where an encoder wraps, or a single row was lost.
     """
-    middle = np.arange(2, run.samples - 2)
-    guess = np.zeros((len(middle), run.joints))
+    travel = np.ptp(run.position, axis=0)
+    off = np.sum((_off_neighbours(run.time, run.position)[:, travel > 0] / travel[travel > 0]) ** 2, axis=1)
+    usual = off[off <= np.quantile(off, 1 - MAX_ODD_SHARE)]
+    return float(np.sqrt(np.mean(usual)))
+
+
+def _off_neighbours(time: Array, signal: Array) -> Array:
+    """How far rows are from the cubic through their neighbours, (rows - 4, columns); steps may differ."""
+    middle = np.arange(2, len(time) - 2)
+    off = signal[middle].copy()
     for own in NEIGHBOURS:
         weight = np.ones(len(middle))
         for other in NEIGHBOURS:
             if other != own:
-                weight *= (run.time[middle] - run.time[middle + other]) / (
-                    run.time[middle + own] - run.time[middle + other]
-                )
-        guess += weight[:, None] * run.position[middle + own]
-    travel = np.ptp(run.position, axis=0)
-    off = np.sum(((run.position[middle] - guess)[:, travel > 0] / travel[travel > 0]) ** 2, axis=1)
-    usual = off[off <= np.quantile(off, 1 - MAX_ODD_SHARE)]
-    return float(np.sqrt(np.mean(usual)))
+                weight *= (time[middle] - time[middle + other]) / (time[middle + own] - time[middle + other])
+        off -= weight[:, None] * signal[middle + own]
+    return off
 
 
 def fit_even_grid(time: Array) -> Grid:
@@ -141,21 +144,18 @@ def fit_grid(time: Array, count: NDArray[np.intp]) -> Grid:
 def is_sampled_unevenly(run: MotionRun, grid: Grid) -> bool:
     """True if the motion follows the lateness of the stamps: q(stamp) = q(grid) + velocity * lateness.
 
-    Fourth differences take the smooth motion out of both sides; the slope between them is one for samples
-    that were taken when their stamps say, zero for even samples with late stamps. What stands still says nothing.
+    The cubic through the neighbours takes the smooth motion out of both sides; the slope between them is one for
+    samples that were taken when their stamps say, zero for even samples with late stamps. What stands still says
+    nothing.
     """
     velocity = np.gradient(run.position, grid.time, axis=0)
-    moved = _fourth_difference(velocity * grid.lateness[:, None])
-    seen = _fourth_difference(run.position)
+    moved = _off_neighbours(grid.time, velocity * grid.lateness[:, None])
+    seen = _off_neighbours(grid.time, run.position)
     scale = np.array([np.median(own[own > 0]) if np.any(own > 0) else 0.0 for own in np.abs(seen).T])
     weight = np.where(scale > 0, 1 / np.where(scale > 0, scale, 1.0), 0.0)
     moved, seen = moved * weight, seen * weight
     length = float(np.sum(moved**2))
     return length > 0 and float(np.sum(moved * seen)) / length > 0.5
-
-
-def _fourth_difference(signal: Array) -> Array:
-    return np.diff(signal, n=4, axis=0)
 
 
 def _keep_stamps(run: AnyRun, grid: Grid, worst: float) -> AnyRun:
