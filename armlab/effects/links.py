@@ -397,12 +397,14 @@ class LinkLaw:
     rivals: tuple[str, ...]
 
 
-def link_law(arm: Arm, link: int, mean: Array, spread: Array, added: bool) -> LinkLaw:
-    """The first name for what a link (from 1) has more than its simulation.
+def link_law(arm: Arm, link: int, mean: Array, spread: Array, added: bool) -> LinkLaw | None:
+    """The first name for what a link (from 1) has more than its simulation; None where a negative mass would be left.
 
     A payload where it can be a body, the link is the last one, and `added` says that no other link is off as far;
     else an error of the link. mean (10,), spread (10, 10): of its ten parameters.
     """
+    if arm.links is not None and arm.links[link - 1].mass + mean[0] < 0:
+        return None
     body = _may_be_body(mean, spread)
     names = (PAYLOAD_FACTS.id, INERTIAL_ERROR_FACTS.id)
     if body and added and link == len(arm):

@@ -15,6 +15,8 @@ from armlab.recordings.recording_file import FILE_NAME, RecordingFile, RunEntry,
 from armlab.recordings.table import Table
 from armlab.recordings.units import SENSOR_SIGNALS, SIGNAL_QUANTITIES, TIME_UNITS, Unit, resolve_units
 from problem.arm import Arm
+from problem.motion import Motion
+from problem.regressor import rigid_body_torque
 
 MAX_GAIN = 1e6  # N.m per A or V: no drive has more
 DRIVE_SIGNALS = ("torque", "current")
@@ -236,6 +238,17 @@ def read_late(run: Run, delay: Array) -> Run:
         raise InputError(f"{run.file}: torque that is {np.abs(delay).max():.3g} s late leaves nothing of the run")
     shifted = [np.interp(run.time + late, run.time, own) for late, own in zip(delay, run.torque.T, strict=True)]
     return replace(run, torque=np.column_stack(shifted)).rows(kept)
+
+
+def restore_gravity(run: Run, arm: Arm) -> Run:
+    """The run with the gravity of the arm's links, which the drive took from the torque."""
+    return replace(run, torque=run.torque + gravity_torque(arm, run.position))
+
+
+def gravity_torque(arm: Arm, position: Array) -> Array:
+    """Torque that holds the links of an arm, (samples, joints), N m or N."""
+    still = np.zeros_like(position)
+    return np.asarray(rigid_body_torque(arm, Motion(position, still, still))).reshape(position.shape)
 
 
 RATE_TOLERANCE = 0.02  # relative: clocks that are off by so little are one clock

@@ -109,7 +109,8 @@ def part_equal_stamps(run: AnyRun) -> AnyRun:
     if np.all(np.diff(spread.time) > 0):
         return spread
     even = repair_stamps(run)
-    return even if np.all(np.diff(even.time) > 0) else _keep_one_of_each(spread)
+    within_tick = np.ptp(even.time - run.time) <= (1 + MAX_LOST_SHARE) * np.median(np.diff(stamps))  # else rows lack
+    return even if within_tick and np.all(np.diff(even.time) > 0) else _keep_one_of_each(spread)
 
 
 def require_fine_clock(file: str, time: Array) -> None:

@@ -13,6 +13,7 @@ from armlab.recordings.channels import (
     check_rate,
     make_raw_run,
     make_transmission,
+    restore_gravity,
     take_timing_back,
     to_joint_side,
 )
@@ -62,6 +63,8 @@ def open_recording(folder: Path) -> tuple[Recording, RecordingFile]:
     arm = load_arm(file.robot, folder)
     if file.gravity is not None:
         arm = replace(arm, gravity=file.gravity)
+    if file.restore_gravity and arm.links is None:
+        raise InputError(f"restore_gravity in {folder / FILE_NAME}: the robot states no links whose gravity is known")
     transmission = make_transmission(file, arm, folder)
     simulation = folder / file.simulation if file.simulation else None
     if simulation and not simulation.is_file():
@@ -88,9 +91,9 @@ def load_runs(recording: Recording, file: RecordingFile, entry: RunEntry) -> tup
     run = make_raw_run(table, file, entry, units)
     places = RepairPlaces(table.row_numbers, file, entry, units, recording.arm.joints, recording.transmission)
     del table  # of a large log, its numbers are as much memory as the run
-    return tuple(
-        take_timing_back(part, file.timing, str(recording.folder / FILE_NAME)) for part in repair_run(run, places)
-    )
+    where = str(recording.folder / FILE_NAME)
+    timed = (take_timing_back(part, file.timing, where) for part in repair_run(run, places))
+    return tuple(restore_gravity(part, recording.arm) if file.restore_gravity else part for part in timed)
 
 
 @dataclass(frozen=True, eq=False)

@@ -158,7 +158,8 @@ class RecordingFile(Settings):
     units: of each signal, one for all its columns or one a column. gains: N m (N) per A or V, one a channel.
     controller: of the simulation; null where it is unknown. recorded: the day, as 2026-01-31. timing: errors of the
     clock that are taken back. gravity: m/s2 in the base frame, where the arm is mounted otherwise than its robot file
-    says. joints: of a recording of motion only, names of the joints that the columns belong to; all if left out.
+    says. restore_gravity: whether the gravity of the robot's links, which the drive took from the torque, is added.
+    joints: of a recording of motion only, names of the joints that the columns belong to; all if left out.
     The others are held at zero.
     """
 
@@ -175,6 +176,7 @@ class RecordingFile(Settings):
     recorded: date | None = None
     timing: TimingEntry | None = None
     gravity: tuple[float, float, float] | None = None
+    restore_gravity: bool = False
     runs: Annotated[tuple[RunEntry, ...], Len(min_length=1)]
 
     @property

@@ -8,6 +8,7 @@ import pytest
 from effect_scenes import candidate, scene, scene_of, waves
 
 from armlab.common.arrays import Array
+from armlab.effects.links import link_law
 from armlab.effects.springs import LinearSpring
 from problem.pseudo_inertia import link_from_centre_of_mass
 from problem.regressor import rigid_body_torque
@@ -118,3 +119,10 @@ def test_a_spring_at_a_joint_that_gravity_does_not_load_is_a_cable_whatever_roun
     seen = scene_of(arm, motion, time)
     for stiffness in (5.0, -5.0):
         assert LinearSpring.at(arm, 1).first_name(np.array([stiffness, 0.3]), [seen]).effect == "cable_stiffness"
+
+
+def test_no_claim_about_a_link_leaves_it_a_negative_mass() -> None:
+    arm, spread = load_arm("irb120-arm"), 1e-4 * np.eye(10)
+    mass = arm.links[2].mass
+    assert link_law(arm, 3, np.array([-1.01 * mass, *np.zeros(9)]), spread, added=False) is None
+    assert link_law(arm, 3, np.array([-0.99 * mass, *np.zeros(9)]), spread, added=False) is not None

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from recording_folders import ARM, POSITION, TORQUE, folder_with, frame
+from recording_folders import ARM, POSITION, TORQUE, folder_with, frame, motion_at
 
 from armlab.common.errors import InputError
 from armlab.recordings.check import check_recording
@@ -29,7 +29,7 @@ from armlab.recordings.reading.mistakes import (
     units,
 )
 from armlab.recordings.reading.mistakes import spring as with_spring
-from armlab.recordings.reading.reading import Mistake, Reading, read_as_is
+from armlab.recordings.reading.reading import OF_LINKS, Mistake, Reading, read_as_is
 from armlab.recordings.reading.signals import thin_channels
 from armlab.recordings.reading.signs import compare_joint_names, compare_standstill
 from armlab.recordings.reading.singles import _is_quarter, search_singles
@@ -156,6 +156,25 @@ def test_torque_without_gravity_is_found(tmp_path: Path) -> None:
     recording = recording_with(tmp_path / "rig")
     changed = tuple(replace(run, torque=run.torque - _gravity_torque(run.position)) for run in recording.runs)
     assert "gravity_compensated_torque" in names_of(answer_to(replace(recording, runs=changed)))
+
+
+def test_gravity_of_the_links_is_added_where_a_drive_takes_it_out_and_a_load_is_carried(tmp_path: Path) -> None:
+    recording = recording_with(tmp_path / "rig")
+    last = ARM.links[2]
+    heavy = replace(last, mass=2 * last.mass, first_moment=tuple(2 * each for each in last.first_moment))
+    runs = []
+    for seed, run in enumerate(recording.runs):
+        motion = motion_at(run.time, seed)
+        loaded = rigid_body_torque(replace(ARM, links=(*ARM.links[:2], heavy)), motion) - rigid_body_torque(ARM, motion)
+        runs.append(replace(run, torque=run.torque + loaded - _gravity_torque(run.position)))
+    answer = answer_to(replace(recording, runs=tuple(runs)))
+    assert [each.mistake.form for each in answer.findings] == [OF_LINKS]
+    texts = corrected_texts(recording.folder, answer.reading, tmp_path / "corrected")
+    (tmp_path / "corrected").mkdir()
+    for name, text in texts.items():
+        (tmp_path / "corrected" / name).write_text(text)
+    read = load_recording(tmp_path / "corrected").runs[0]
+    assert read.torque == pytest.approx(recording.runs[0].torque + _gravity_torque(read.position))
 
 
 def _gravity_torque(position: np.ndarray) -> np.ndarray:

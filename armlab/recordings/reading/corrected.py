@@ -10,7 +10,7 @@ import yaml
 
 from armlab.common.arrays import Array
 from armlab.common.settings import to_plain_data
-from armlab.recordings.channels import read_late
+from armlab.recordings.channels import read_late, restore_gravity
 from armlab.recordings.load import open_recording
 from armlab.recordings.reading.mistakes import read_robot_file
 from armlab.recordings.reading.reading import Reading
@@ -60,7 +60,8 @@ def _correct_run(run: Run, given: Transmission, reading: Reading) -> Run:
             signals[name] = _mix(signal - given.offset, to_joints) + reading.offset
         elif name in VELOCITY_SIGNALS:
             signals[name] = _mix(signal, to_joints)
-    return read_late(run.with_signals(run.time / reading.clock, signals), reading.delay)
+    read = read_late(run.with_signals(run.time / reading.clock, signals), reading.delay)
+    return restore_gravity(read, reading.arm) if reading.adds_gravity else read
 
 
 def _mix(signal: Array, matrix: Array) -> Array:
@@ -96,6 +97,8 @@ def _recording_settings(
     settings["robot"] = beside(recording.robot) if urdf else "robot.yaml"
     if urdf and reading.arm.gravity != recording.arm.gravity:
         settings["gravity"] = list(reading.arm.gravity)
+    if reading.adds_gravity:
+        settings["restore_gravity"] = True
     for run in settings["runs"]:
         run["file"] = beside(run["file"])
     if file.simulation is not None:

@@ -6,7 +6,7 @@
 | channel_swap, channel_order | each pair of columns; all columns shifted by one, backwards, or in alphabetical order |
 | encoder_offset | each joint that turns, in steps of 45 degrees, then refined |
 | unit_error, gear_ratio | factors between usual units, and ratios of gears |
-| base_tilt, gravity_compensated_torque | gravity along the axes and diagonals, then refined; no gravity |
+| base_tilt, gravity_compensated_torque | gravity along axes and diagonals, then refined; none, or of links |
 | dh_convention, inertia_reference, link_data_error | other meanings of the numbers of the robot file |
 | axis_coupling | a column that counts the sum or the difference of two joints in a row, with and without its torque |
 | clock_error, time_delay, channel_skew | factors of time and shifts of torque, then refined |
@@ -22,7 +22,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.settings import read_yaml, validate
-from armlab.recordings.reading.reading import BOTH, SPRING, Mistake, Reading
+from armlab.recordings.reading.reading import BOTH, OF_LINKS, SPRING, Mistake, Reading
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
 from problem.pseudo_inertia import link_from_centre_of_mass, links_of
@@ -167,6 +167,13 @@ def without_gravity(reading: Reading) -> Reading:
     return reading.with_gravity(np.zeros(3)).with_mistake(Mistake("gravity_compensated_torque"))
 
 
+def with_gravity_of_links(reading: Reading) -> Iterator[Reading]:
+    """The reading in which the drive takes the gravity of the robot file's links from the torque, and of no load."""
+    if reading.arm.links is not None and not reading.adds_gravity:
+        mistake = Mistake("gravity_compensated_torque", form=OF_LINKS)
+        yield replace(reading, adds_gravity=True).with_mistake(mistake)
+
+
 def late_torque(reading: Reading, joint: int | None, seconds: float) -> Reading:
     """The reading in which the torque, of one joint or of all, is late."""
     effect = "time_delay" if joint is None else "channel_skew"
@@ -266,7 +273,7 @@ THREADS_AND_READINGS = {
     "unit_error": (17, 6, 6, 0),
     "gear_ratio": (5, 0, 2 * len(GEAR_RATIOS), 0),
     "base_tilt": (6, 14, 0, 0),
-    "gravity_compensated_torque": (7, 1, 0, 0),
+    "gravity_compensated_torque": (7, 2, 0, 0),
     "dh_convention": (3, 1, 0, 0),
     "inertia_reference": (3, 3, 0, 0),
     "link_data_error": (11, 5, 5, 0),
@@ -340,6 +347,7 @@ def take_back(reading: Reading, mistake: Mistake, recording: Recording) -> Readi
         *signs(reading),
         *exchanges(reading, joint_names(reading.arm)),
         without_gravity(reading),
+        *with_gravity_of_links(reading),
         *robot_file_meanings(reading, recording),
     ]
     for each in exact:

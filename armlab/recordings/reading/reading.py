@@ -15,6 +15,7 @@ from armlab.recordings.recording import Recording
 from problem.arm import Arm
 
 BOTH = "position and torque"  # the form of a mistake
+OF_LINKS = "of the links"  # the form of a mistake
 SPRING = "cable_stiffness"  # physics that a joint may have in the place of a mistake
 
 
@@ -53,6 +54,7 @@ class Reading:
     torque_order: which recorded channel stands at each place. clock: recorded time over true time. delay: (joints,), s,
     by which torque is late. arm, inertial: the robot, and (10 * joints,) of the links of the simulation if there is
     one. mistakes: what was taken back. springs: joints (from 0) that have one beside links and friction.
+    adds_gravity: of the links of the robot file, which the drive took from the torque.
     """
 
     position: Array
@@ -67,6 +69,7 @@ class Reading:
     inertial: Array | None
     mistakes: tuple[Mistake, ...] = ()
     springs: tuple[int, ...] = ()
+    adds_gravity: bool = False
 
     @property
     def joints(self) -> int:

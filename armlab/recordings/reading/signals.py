@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
+from armlab.recordings.channels import gravity_torque
 from armlab.recordings.cutoff import MAX_CUTOFF_SHARE, MIN_CUTOFF_PERIODS, travel_bandwidth
 from armlab.recordings.differentiate import Signals, differentiate, resample_evenly
 from armlab.recordings.filters import Filter
@@ -107,7 +108,7 @@ class Channels:
         order, out = list(reading.torque_order), np.empty((self.rows, reading.joints))
         for joint, (row, delay) in enumerate(zip(reading.torque, reading.delay, strict=True)):
             out[:, joint] = self.torque_at(float(delay * reading.clock))[:, order] @ row
-        return out
+        return out + gravity_torque(reading.arm, self.read_motion(reading).position) if reading.adds_gravity else out
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,6 +46,7 @@ def _exact(judge: Judge, reading: Reading) -> Iterable[Reading]:
         if not (judge.clock_is_right and each.clock != reading.clock):
             yield each
     yield table.without_gravity(reading)
+    yield from table.with_gravity_of_links(reading)
     yield from table.robot_file_meanings(reading, judge.recording)
     if reading.inertial is not None:
         yield from _torque_factors(judge, reading)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from armlab.recordings.reading.reading import SPRING, Mistake
+from armlab.recordings.reading.reading import OF_LINKS, SPRING, Mistake
 from problem.arm import Arm
 from problem.joint_words import joint_in_words, joints_in_words, links_in_words
 
@@ -67,7 +67,9 @@ def describe(mistake: Mistake, arm: Arm) -> str:
         "joint_direction": f"{place} counts the other way round ({form})",
         "channel_swap": f"the {form} columns of {pair} are exchanged",
         "channel_order": f"the {form} columns stand in the order {', '.join(map(str, mistake.joints))}",
-        "gravity_compensated_torque": "the recorded torque holds no gravity",
+        "gravity_compensated_torque": "the gravity of the links of the robot file is taken from the recorded torque"
+        if form == OF_LINKS
+        else "the recorded torque holds no gravity",
         "dh_convention": f"the D-H table is of the {form} convention",
         "inertia_reference": _reference_text(form),
     }

@@ -120,8 +120,9 @@ def _link_claims(
         place = slice(10 * link, 10 * link + 10)
         added = is_outlying(widths, link, bench.settings.tuning.claims.outlying_factor)
         law = link_law(bench.simulation.arm, link + 1, mean[place], spread[place, place], added=added)
-        claim = _link_claim(model, wide.factor, law, mean[place], spread[place, place], evidence)
-        claims.append(replace(claim, weighed=names[link]))
+        if law is not None:  # else these data tell of something that is no link
+            claim = _link_claim(model, wide.factor, law, mean[place], spread[place, place], evidence)
+            claims.append(replace(claim, weighed=names[link]))
     return claims
 
 
