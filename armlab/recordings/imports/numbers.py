@@ -58,9 +58,10 @@ def _read_file(
     ones = (1.0,) * len(joints)
     ratios = {name: gear.ratios if gear and gear.is_before(name) else ones for name in wanted}
     factors = {name: gear.factors(name) if gear else ones for name in wanted}
-    signals = {name: source.table.columns(columns[name], name) for name in wanted}
-    for name, values in signals.items():
-        values *= np.array(factors[name])
+    signals = {name: source.table.view(columns[name], name) for name in wanted}
+    for name in wanted:
+        if factors[name] != ones:
+            signals[name] = signals[name] * np.array(factors[name])
     time = source.table.columns(columns["time"], "time")[:, 0]
     needed = [np.isfinite(values).all(axis=1) for name, values in signals.items() if name != "velocity"]
     whole = np.isfinite(time) & np.all(needed, axis=0)
