@@ -36,7 +36,7 @@ from armlab.identification.validation import (
     total_error_line,
 )
 from armlab.recordings.cutoff_trial import choose_cutoff_hz
-from armlab.recordings.identifiable import require_identifiable, require_torque
+from armlab.recordings.identifiable import reason_impossible, require_identifiable, require_torque
 from armlab.recordings.load import load_recording
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER, corrected_texts
@@ -171,6 +171,9 @@ def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Res
         raise InputError(f"--tolerance needs nominal `links`, and the robot {recording.arm.name} has none")
     if not options.as_read:
         _refuse_wrong_reading(recording, out)
+    reason = reason_impossible(runs, recording.arm)
+    if reason is not None:
+        raise InputError(f"{folder}: {reason}")
     try:
         identifier, how = _build_identifier(recording, options)
         identifier.fit(runs)

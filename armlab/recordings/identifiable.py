@@ -10,6 +10,13 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.recordings.possible import (
+    OUTLIER_SHARE,
+    can_have_position,
+    can_have_torque,
+    position_range,
+    usual_speeds,
+)
 from armlab.recordings.recording import Recording, Run
 from armlab.recordings.repair import duplicated_rows
 from problem.arm import Arm
@@ -85,6 +92,22 @@ def reason_dead(runs: Sequence[Run], arm: Arm) -> str | None:
 
 def _is_copy(first: Array, second: Array) -> bool:
     return bool(np.ptp(first) > 0 and np.array_equal(first, second))
+
+
+def reason_impossible(runs: Sequence[Run], arm: Arm) -> str | None:
+    """Positions and torques that no arm could show, as the import refuses them; asked once units are read rightly."""
+    for run in runs:
+        low, high = position_range(run.position)
+        speeds = usual_speeds(run.position, float(np.median(np.diff(run.time))))
+        for place, joint in enumerate(arm.joints):
+            words = joints_in_words(arm, [place + 1])
+            if not can_have_position(joint, low[place], high[place], speeds[place]):
+                reached = f"runs from {low[place]:.4g} to {high[place]:.4g}"
+                return f"The position of {words} {reached}: no arm is there. Which unit is it in?"
+            torque = float(np.quantile(np.abs(run.torque[:, place]), 1 - OUTLIER_SHARE))
+            if not can_have_torque(joint, torque, 0.0, None):
+                return f"The torque of {words} reaches {torque:.4g}, more than any drive has. Which unit is it in?"
+    return None
 
 
 def reason_copied(recording: Recording) -> str | None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from recording_folders import POSITION, SETTINGS, TORQUE, folder_with, frame
+from recording_folders import ARM, POSITION, SETTINGS, TORQUE, folder_with, frame
 from refusals import refusal
 
 from armlab.common.errors import DataError
@@ -17,6 +17,7 @@ from armlab.identification.identify import IdentifyOptions, identify_recording, 
 from armlab.identification.payload import PayloadSetting, Place, gains_lines, payload_lines
 from armlab.identification.torque_model import parameter_line
 from armlab.identification.validation import error_table, run_error
+from armlab.recordings.identifiable import reason_impossible
 from armlab.recordings.load import load_recording
 from armlab.report.changes.report import compare_recordings
 
@@ -141,3 +142,16 @@ def test_no_interval_of_no_width_is_printed(tmp_path: Path) -> None:
             low, high = line[line.index("[") + 1 : line.index("]")].split(", ")
             assert low != high
     assert np.isfinite(fitted.base_values).all()
+
+
+@pytest.mark.parametrize(
+    ("columns", "factor", "said"), [(POSITION, 1e4, "no arm is there"), (TORQUE, 1e6, "any drive")]
+)
+def test_numbers_that_no_arm_has_are_refused_in_a_folder_written_by_hand(
+    tmp_path: Path, columns: list[str], factor: float, said: str
+) -> None:
+    table = frame()
+    table[columns] *= factor
+    (run, *_) = load_recording(folder_with(tmp_path, table)).runs
+    assert said in str(reason_impossible([run], ARM))
+    assert reason_impossible([load_recording(folder_with(tmp_path, frame())).runs[0]], ARM) is None

@@ -23,7 +23,7 @@ from armlab.diagnosis.torque.search.fitted_model import (
 )
 from armlab.diagnosis.torque.stages import NAMES_THAT_ARE_PROBABLE, NAMES_THAT_HOLD, find_names, run_stages
 from armlab.recordings.check import signs_of_wrong_reading
-from armlab.recordings.identifiable import reason_not_identifiable
+from armlab.recordings.identifiable import reason_impossible, reason_not_identifiable
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording
@@ -131,7 +131,7 @@ def prepare(
 ) -> DesignMatrix | Diagnosis:
     """The runs filtered, and the columns of the links; a diagnosis where nothing can be said, and why."""
     simulation = read_simulation(recording, baseline)
-    reason = reason_not_identifiable(recording)
+    reason = reason_not_identifiable(recording) or reason_impossible(recording.runs, recording.arm)
     if reason is not None:
         return Diagnosis(recording, simulation, "inconclusive", reason)
     progress("filtering")
