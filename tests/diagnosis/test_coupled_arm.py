@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from armlab.diagnosis.diagnose import diagnose
 from passive_parts_study import Sines
 from refusals import refusal
 from robot_file_table import FILES
 
 from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.identification.model_file import write_model
 from armlab.identification.write_simulator import export_model
 from armlab.recordings.check import check_recording
