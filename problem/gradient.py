@@ -18,21 +18,58 @@ of truncation: d sigma_i = u_i' dW v_i gives the rest. There is no second implem
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from problem.arm import Arm
+from problem.base_parameters import BaseParameters
 from problem.feasible import FeasibleFourier
+from problem.fitness import Criterion
 from problem.friction import FRICTION_NAMES, VISCOUS, friction_matrix
+from problem.limits import Constraints
 from problem.motion import Motion
 from problem.regressor import observation_matrix
 from problem.trajectories import CartesianFourier, JointFourier, Trajectory
 
-if TYPE_CHECKING:
-    from problem.excitation import ExcitationProblem  # which stands on this module
+
+class Excitation(Protocol):
+    """What a gradient asks of an excitation problem: `problem.excitation.ExcitationProblem` is one."""
+
+    @property
+    def arm(self) -> Arm:
+        """The arm that moves."""
+
+    @property
+    def base(self) -> BaseParameters:
+        """The columns of its observation matrix."""
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The family of motions."""
+
+    @property
+    def times(self) -> Array:
+        """Instants of the samples, s."""
+
+    @property
+    def constraints(self) -> Constraints:
+        """The limits that it keeps."""
+
+    @property
+    def criterion(self) -> Criterion:
+        """What is made small."""
+
+    @property
+    def unit_columns(self) -> bool:
+        """Whether columns are scaled to unit length."""
+
+    @property
+    def friction_columns(self) -> bool:
+        """Whether there are columns of friction and offset of each joint."""
+
 
 Complex = NDArray[np.complex128]
 
@@ -160,7 +197,7 @@ _TRIGONOMETRIC_STENCIL = (
 _QUADRATIC_STENCIL = ((1.0, 0.5), (-1.0, -0.5))  # exact for a polynomial of degree 2, whatever the step
 
 
-def condition_gradient(problem: "ExcitationProblem", point: Array) -> tuple[float, Array]:
+def condition_gradient(problem: Excitation, point: Array) -> tuple[float, Array]:
     """Condition number of a point (dimension,) and its gradient (dimension,), without weights and penalty.
 
     Where the largest or the smallest singular value is a multiple one, this is one of several
@@ -177,12 +214,12 @@ def condition_with_derivatives(values: Array) -> tuple[float, Array]:
     return float(values[0] / values[-1]), slope
 
 
-def motion_of(problem: "ExcitationProblem", point: Array) -> Motion:
+def motion_of(problem: Excitation, point: Array) -> Motion:
     """The motion (samples, joints) of a point (dimension,)."""
     return problem.trajectory.motions(point[None], problem.times).motion.select(np.intp(0))
 
 
-def spectral_gradient(problem: "ExcitationProblem", point: Array, function: SpectralFunction) -> tuple[float, Array]:
+def spectral_gradient(problem: Excitation, point: Array, function: SpectralFunction) -> tuple[float, Array]:
     """A function of the singular values of a point's observation matrix, and its gradient (dimension,)."""
     motion = motion_of(problem, point)
     basis = tangents(problem.trajectory, motion, point, problem.times)
@@ -190,7 +227,7 @@ def spectral_gradient(problem: "ExcitationProblem", point: Array, function: Spec
 
 
 def spectral_gradient_along(
-    problem: "ExcitationProblem", motion: Motion, basis: Array, function: SpectralFunction
+    problem: Excitation, motion: Motion, basis: Array, function: SpectralFunction
 ) -> tuple[float, Array]:
     """The same for a motion (samples, joints) with its tangents (3, dimension, samples, joints)."""
     value, weights = _matrix_weights(problem, motion, function)
@@ -236,7 +273,7 @@ def _viscous_weights(weights: Array, motion: Motion) -> Array:
     return np.asarray(by_joint[:, joints, joints, VISCOUS])
 
 
-def _matrix_weights(problem: "ExcitationProblem", motion: Motion, function: SpectralFunction) -> tuple[float, Array]:
+def _matrix_weights(problem: Excitation, motion: Motion, function: SpectralFunction) -> tuple[float, Array]:
     """The function's value and its derivative with respect to each entry of the whole matrix.
 
     That is the observation matrix, and behind it the friction columns where the problem has them. Infinite, with

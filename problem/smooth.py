@@ -7,7 +7,6 @@ spectrum, ||sigma||_p and ||1 / sigma||_p, which have one; their limits for larg
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +16,8 @@ from armlab.common.derivatives import Derivatives, Question
 from problem.arm import Limits
 from problem.feasible import FeasibleFourier
 from problem.fitness import Criterion
-from problem.gradient import SpectralFunction, motion_of, spectral_gradient_along, tangents
+from problem.gradient import Excitation, SpectralFunction, motion_of, spectral_gradient_along, tangents
 from problem.motion import Motion
-
-if TYPE_CHECKING:
-    from problem.excitation import ExcitationProblem  # which stands on this module
 
 
 def smooth_criterion(criterion: Criterion, power: float) -> SpectralFunction:
@@ -61,7 +57,7 @@ class LimitRows:
     there is no limit, or where the search space keeps it.
     """
 
-    problem: "ExcitationProblem"
+    problem: Excitation
 
     def distances(self, motion: Motion) -> Array:
         """Distances (rows,) of a motion (samples, joints); negative where a limit is broken."""
@@ -87,7 +83,7 @@ class LimitRows:
         return low, high, np.where(np.isfinite(high - low), (high - low) / 2, 1.0)
 
 
-def differentiate(problem: "ExcitationProblem", rows: LimitRows, point: Array, question: Question) -> Derivatives:
+def differentiate(problem: Excitation, rows: LimitRows, point: Array, question: Question) -> Derivatives:
     """The answer of an excitation problem to a question about a point (dimension,)."""
     with np.errstate(all="ignore"):  # a line search may leave what the arm can reach
         motion = motion_of(problem, point)
