@@ -56,8 +56,8 @@ def test_friction_that_steps_between_plateaus_is_a_curve_through_both(step_found
 def test_what_is_unknown_and_follows_the_own_velocity_of_a_joint_is_a_friction_curve(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    others = tuple(each for each in stages.NAMES_THAT_HOLD if each.run is not find_friction_curves)
-    monkeypatch.setattr(stages, "NAMES_THAT_HOLD", others)
+    others = tuple(each for each in stages.BY_TESTS if each.run is not find_friction_curves)
+    monkeypatch.setattr(stages, "BY_TESTS", others)
     found = diagnose(cases.recording(STEP_AT_JOINT_2, seconds=10.0))
     (claim,) = (each for each in found.claims if each.joint == 2)
     assert claim.effect == "friction_curve"

@@ -15,7 +15,7 @@ from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.diagnosis.torque.evidence.evidence import Evidence
 from armlab.diagnosis.torque.evidence.pruning import first_failed_test
 from armlab.diagnosis.torque.search.search import FailedTest, Step
-from armlab.diagnosis.torque.stages import NAMES_THAT_ARE_PROBABLE, NAMES_THAT_HOLD
+from armlab.diagnosis.torque.stages import BY_PROBABILITY, BY_TESTS
 from armlab.report.torque.steps_file import STEPS_FILE, parse_place, steps_texts, why_lines
 from problem.motion import Motion
 
@@ -39,8 +39,8 @@ def test_a_sure_effect_passes_and_each_failed_test_has_its_value_and_its_bound()
         "significance": (replace(SURE, corrected=0.5), 0.5, tuning.level),
         "log evidence": (replace(SURE, score=1.0, gain=0.0), 1.0, tuning.least_evidence),
         "held-out gain": (replace(SURE, gain=0.0), 0.0, tuning.least_gain),
-        "sureness of the held-out gain": (replace(SURE, held_p=0.5), 0.5, tuning.large_gain_level),
-        "validation runs": (replace(SURE, worse=True, validation_gain=-0.1), -0.1, 0.0),
+        "p of the held-out gain": (replace(SURE, held_p=0.5), 0.5, tuning.large_gain_level),
+        "gain on validation runs": (replace(SURE, worse=True, validation_gain=-0.1), -0.1, 0.0),
     }
     for name, (evidence, value, bound) in failing.items():
         failed = first_failed_test(evidence, settings)
@@ -64,7 +64,7 @@ def test_a_finding_and_an_effect_that_no_search_takes_are_answered(found: Diagno
 
 
 def test_the_last_test_that_failed_is_the_answer_with_its_numbers(found: Diagnosis) -> None:
-    failed = FailedTest("held-out gain", "held-out gain 1.2 %", 0.012, 0.03)
+    failed = FailedTest("held-out gain", "held-out gain 1.2 %", 0.012, 0.03, "pruning.least_gain")
     steps = (
         Step("+ backlash 3 (0.1,)", 5.0),
         Step("withdrawn: backlash 3: p = 0.5 after correction", 0.0, FailedTest("significance", "p = 0.5", 0.5, 0.01)),
@@ -72,7 +72,10 @@ def test_the_last_test_that_failed_is_the_answer_with_its_numbers(found: Diagnos
         Step("+ backlash 33", 5.0),
     )
     lines = list(why_lines(replace(found, steps=steps), "backlash", 3))
-    assert lines[0] == "why backlash at joint 3: not named: held-out gain is 0.012, and needs 0.03"
+    assert lines[0].startswith(
+        "why backlash at joint 3: not named: held-out gain is 0.012, and has to be at least 0.03 "
+    )
+    assert lines[0].endswith("(pruning.least_gain)")
     assert lines[1:] == [f"  {each.what}" for each in steps[:3]]
 
 
@@ -87,6 +90,6 @@ def test_a_whole_robot_has_no_joint(found: Diagnosis) -> None:
 
 
 def test_every_stage_says_in_one_sentence_what_it_does() -> None:
-    sentences = [each.sentence for each in (*NAMES_THAT_HOLD, *NAMES_THAT_ARE_PROBABLE)]
+    sentences = [each.sentence for each in (*BY_TESTS, *BY_PROBABILITY)]
     assert all(each.endswith(".") and len(each.split()) <= 25 for each in sentences)
     assert len(set(sentences)) == len(sentences)

@@ -22,7 +22,7 @@ from armlab.diagnosis.torque.evidence.unknown import (
     remaining,
 )
 from armlab.diagnosis.torque.names.claims import Names, links_claim, make_claims
-from armlab.diagnosis.torque.names.decide import named_claims
+from armlab.diagnosis.torque.names.decide import lost_names, named_claims
 from armlab.diagnosis.torque.names.findings import stated_findings, with_minor_ones, without_lesser_unknowns
 from armlab.diagnosis.torque.names.weighing import weigh_effect, weigh_link, weigh_structure
 from armlab.diagnosis.torque.predict.fits import joint_fits
@@ -64,7 +64,10 @@ def conclude(recording: Recording, belief: Belief) -> Diagnosis:
     unknowns = [each for each in remains if not is_form_error(each, explained, belief.tuning.unknown)]
     model, claims = _claims_of(belief, remains, unknowns)
     weighed = (*(claim.weighed for claim in claims), *belief.nothing)
-    claims = named_claims(claims, model.design.settings, model.design.simulation.joints_without_friction)
+    settings, plain = model.design.settings, model.design.simulation.joints_without_friction
+    named = named_claims(claims, settings, plain)
+    model = replace(model, steps=(*model.steps, *lost_names(claims, named, settings)))
+    claims = named
     claims = (*claims, *links_in_doubt(model, prediction.model, claims))
     claims = stated_findings(weigh_claims(prediction.model, claims), model.columns.joints)
     return replace(_assemble(recording, model, prediction, claims, unknowns, remains), weighed=weighed)

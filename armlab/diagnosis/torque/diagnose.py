@@ -21,7 +21,7 @@ from armlab.diagnosis.torque.search.fitted_model import (
     FittedModel,
     Progress,
 )
-from armlab.diagnosis.torque.stages import NAMES_THAT_ARE_PROBABLE, NAMES_THAT_HOLD, find_names, run_stages
+from armlab.diagnosis.torque.stages import BY_PROBABILITY, BY_TESTS, find_names, run_stages
 from armlab.recordings.check import signs_of_wrong_reading
 from armlab.recordings.identifiable import reason_impossible, reason_not_identifiable
 from armlab.recordings.reading.answer import Answer, read_rightly
@@ -149,8 +149,8 @@ def prepare(
 
 def conclude_search(recording: Recording, searched: FittedModel, progress: Progress) -> Diagnosis:
     """The diagnosis of a recording from what a search found."""
-    return _conclude_names(recording, run_stages(NAMES_THAT_HOLD, Belief(searched), progress), progress)
+    return _conclude_names(recording, run_stages(BY_TESTS, Belief(searched), progress), progress)
 
 
 def _conclude_names(recording: Recording, named: Belief, progress: Progress) -> Diagnosis:
-    return conclude(recording, run_stages(NAMES_THAT_ARE_PROBABLE, named, progress))
+    return conclude(recording, run_stages(BY_PROBABILITY, named, progress))

@@ -1,4 +1,10 @@
-"""How a name gets claimed: the stages of a diagnosis in their order, each from a belief to a belief."""
+"""How a name gets claimed: the stages of a diagnosis in their order, each from a belief to a belief.
+
+A search comes first: links and usual friction are fitted, what they leave is scanned for candidates, and the set of
+effects with the best score is searched, round by round with better noise and shapes (`search_effects`). Then come the
+stages of `BY_TESTS` (`find_names`) and of `BY_PROBABILITY`. `conclude.py` makes findings of what is believed then: each
+is told by its name, as a class of names, or as unknown, by its probability (`named_claims` in `names/decide.py`).
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -28,18 +34,21 @@ class Stage:
     sentence: str
     message: str = ""
 
+    @property
+    def name(self) -> str:
+        """Of its function, as in the log."""
+        return self.run.__name__
 
-def predict(belief: Belief) -> Belief:
-    """The same with the model that predicts, whose bodies can exist."""
+
+def choose_prediction(belief: Belief) -> Belief:
+    """The belief with the model that predicts, whose bodies can exist."""
     return replace(belief, prediction=with_possible_bodies(fit_prediction(belief.model)))
 
 
-# A search comes first: links and usual friction are fitted, what they leave is scanned for candidates, and the set of
-# effects with the best score is searched, round by round with better noise and shapes (`search_effects`).
-NAMES_THAT_HOLD = (
+BY_TESTS = (
     Stage(
         prune,
-        "The weakest effect that fails a test leaves, until all pass; then the search looks once more.",
+        "The weakest effect that fails a test (`first_failed_test`) leaves until all pass; the search looks again.",
         "testing claims",
     ),
     Stage(scan_what_is_left, "What passes is taken off, and scans look for gaps, pushes and waves in the rest."),
@@ -50,15 +59,18 @@ NAMES_THAT_HOLD = (
     Stage(name_friction_curves, "Structure that depends on the velocity of its joint alone is a curve of friction."),
     Stage(possible_links, "Links that are off keep a name only if they are bodies with these numbers."),
 )
-NAMES_THAT_ARE_PROBABLE = (
+BY_PROBABILITY = (
     Stage(
         with_likeliest_names,
         "Each effect takes the likeliest name of its finding, by learnt weights.",
         "weighing names",
     ),
-    Stage(add_probable, "Effects that failed a test and are probable all the same are added, one after the other."),
     Stage(
-        predict,
+        add_probable,
+        "What would still raise the log evidence, and has a probable name, is added, though a test failed it.",
+    ),
+    Stage(
+        choose_prediction,
         "The model that predicts is chosen on blocks of the runs that identify: names, and what is only present.",
         "fitting the model that predicts",
     ),
@@ -69,8 +81,8 @@ NAMES_THAT_ARE_PROBABLE = (
 
 def find_names(design: DesignMatrix, seed: int, progress: Progress) -> Belief:
     """The names that hold of what a search finds. seed: of the surrogates' random waves."""
-    searched = Belief(search_effects(fit_background(design, library(), seed, progress), progress))
-    return run_stages(NAMES_THAT_HOLD, searched, progress)
+    searched = search_effects(fit_background(design, library(), seed, progress), progress)
+    return run_stages(BY_TESTS, Belief(searched), progress)
 
 
 def run_stages(stages: Sequence[Stage], belief: Belief, progress: Progress) -> Belief:
@@ -78,5 +90,10 @@ def run_stages(stages: Sequence[Stage], belief: Belief, progress: Progress) -> B
     for stage in stages:
         if stage.message:
             progress(stage.message)
+        known = len(belief.model.steps)
         belief = stage.run(belief)
+        steps = belief.model.steps
+        if len(steps) > known:
+            own = (replace(each, stage=stage.name) for each in steps[known:])
+            belief = replace(belief, model=replace(belief.model, steps=(*steps[:known], *own)))
     return belief

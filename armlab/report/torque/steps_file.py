@@ -17,6 +17,7 @@ from problem.arm import Arm
 
 STEPS_SCHEMA: Final = "steps/1"
 STEPS_FILE: Final = "steps.json"
+SEARCH: Final = "search"  # the stage before the others
 LEAST_GAIN = SearchTuning().min_score_step  # nats, that a search asks of an effect
 
 Place = tuple[str, int | None]
@@ -28,7 +29,7 @@ def steps_texts(diagnosis: Diagnosis) -> dict[str, str]:
         "schema": STEPS_SCHEMA,
         "steps": [_step_entry(each) for each in diagnosis.steps],
         "not_taken": [
-            {"effect": each.effect, "joint": each.joint, "gain": each.gain, "objection": each.objection}
+            {"effect": each.effect, "joint": each.joint, "log_evidence": each.gain, "objection": each.objection}
             for each in diagnosis.not_taken
         ],
     }
@@ -37,8 +38,10 @@ def steps_texts(diagnosis: Diagnosis) -> dict[str, str]:
 
 def _step_entry(step: Step) -> dict[str, Any]:
     failed = step.failed
-    test = {} if failed is None else {"test": failed.test, "value": failed.value, "bound": failed.bound}
-    return {"what": step.what, "score": step.score, **test}
+    if failed is None:
+        return {"stage": step.stage or SEARCH, "what": step.what, "score": step.score}
+    test = {"test": failed.test, "value": failed.value, "bound": failed.bound, "number": failed.number or None}
+    return {"stage": step.stage, "what": step.what, **test, "has_to_be": "at least" if failed.at_least else "at most"}
 
 
 def parse_place(text: str, arm: Arm) -> Place:
@@ -89,7 +92,9 @@ def _answer(diagnosis: Diagnosis, mentioned: list[Step], effect: str, joint: int
 def _test_in_words(failed: FailedTest) -> str:
     if failed.value is None or failed.bound is None:
         return failed.text
-    return f"{failed.test} is {format_number(failed.value)}, and needs {format_number(failed.bound)}"
+    bound = f"{'at least' if failed.at_least else 'at most'} {format_number(failed.bound)}"
+    number = f" ({failed.number})" if failed.number else ""
+    return f"{failed.test} is {format_number(failed.value)}, and has to be {bound}{number}"
 
 
 def _mentions(step: Step, effect: str, joint: int | None) -> bool:

@@ -26,24 +26,26 @@ def first_failed_test(evidence: Evidence, settings: Settings) -> FailedTest | No
     guards, tuning = settings.guards, settings.tuning.pruning
     if guards.physics_signs and evidence.objection is not None:
         return FailedTest("laws of physics", evidence.objection)
-    p_value, score = evidence.corrected, evidence.score
+    p_value, score, gain = evidence.corrected, evidence.score, evidence.gain
     if p_value > tuning.level:
-        return FailedTest("significance", f"p = {p_value:.2g} after correction", p_value, tuning.level)
-    if not evidence.usual and score < tuning.least_evidence and evidence.gain < tuning.self_evident_gain:
-        text = f"log evidence {score:.0f}: too little for a name"
-        return FailedTest("log evidence", text, score, tuning.least_evidence)
+        text = f"p = {p_value:.2g} after correction"
+        return FailedTest("significance", text, p_value, tuning.level, "pruning.level", at_least=False)
+    if not evidence.usual and score < tuning.least_evidence and gain < tuning.self_evident_gain:
+        text = f"log evidence {score:.0f}, too little for a name of {100 * gain:.3g} % held-out gain"
+        return FailedTest("log evidence", text, score, tuning.least_evidence, "pruning.least_evidence")
     least = tuning.least_gain * (1.0 if evidence.repeatable else tuning.single_event_share)
-    if guards.heldout_gain and evidence.gain < least:
-        return FailedTest("held-out gain", f"held-out gain {100 * evidence.gain:.2g} %", evidence.gain, least)
+    if guards.heldout_gain and gain < least:
+        return FailedTest("held-out gain", f"held-out gain {100 * gain:.3g} %", gain, least, "pruning.least_gain")
     if not evidence.repeatable:
         return None
-    level = tuning.large_gain_level if evidence.gain > tuning.large_gain else tuning.held_out_level
+    name = "large_gain_level" if gain > tuning.large_gain else "held_out_level"
+    level = tuning.large_gain_level if gain > tuning.large_gain else tuning.held_out_level
     if guards.heldout_gain and not evidence.usual and evidence.held_p > level:
         text = f"held-out gain not sure (p = {evidence.held_p:.2g})"
-        return FailedTest("sureness of the held-out gain", text, evidence.held_p, level)
+        return FailedTest("p of the held-out gain", text, evidence.held_p, level, f"pruning.{name}", at_least=False)
     if guards.heldout_gain and evidence.worse:
         text = f"validation gets worse by {-100 * evidence.validation_gain:.2g} %"
-        return FailedTest("validation runs", text, evidence.validation_gain, 0.0)
+        return FailedTest("gain on validation runs", text, evidence.validation_gain, 0.0)
     return None
 
 

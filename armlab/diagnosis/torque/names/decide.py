@@ -13,6 +13,7 @@ from armlab.diagnosis.choice import Weights, probabilities
 from armlab.diagnosis.result import Claim, Member, Weighed, WeighedName
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.names.claims import next_experiment
+from armlab.diagnosis.torque.search.search import FailedTest, Step
 from armlab.diagnosis.tuning import NamingTuning
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.friction_curve import FRICTION_CURVE_FACTS
@@ -121,6 +122,17 @@ def named_claims(claims: Sequence[Claim], settings: Settings, plain: Collection[
         else:
             out[there] = _together(out[there], each)
     return tuple(map(_limited, out))
+
+
+def lost_names(before: Sequence[Claim], after: Sequence[Claim], settings: Settings) -> Iterator[Step]:
+    """For the log: which laws of claims are not told by their name. before, after: without and with probabilities."""
+    told, least = {(each.effect, each.joint) for each in after}, settings.tuning.naming.level
+    for claim in before:
+        if claim.candidate is not None and (claim.effect, claim.joint) not in told:
+            chance = naming_of(claim.weighed, settings).probability_of(claim.effect, claim.joint)
+            text = f"its probability is {chance:.2g}"
+            failed = FailedTest("probability of the name", text, chance, least, "naming.level")
+            yield replace(Step.against(claim.candidate, failed, "told without its name"), stage=named_claims.__name__)
 
 
 def _limited(claim: Claim) -> Claim:

@@ -28,21 +28,31 @@ def rival_formulas(groups: Sequence[Group], number: int) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class FailedTest:
-    """A test that a name did not pass, in words. value, bound: what was compared, None where it is no number."""
+    """A test that a name did not pass, in words.
+
+    value, bound: what was compared, None where it is no number; number: the tuning number that is the bound;
+    at_least: whether the value has to be at least the bound, or at most.
+    """
 
     test: str
     text: str
     value: float | None = None
     bound: float | None = None
+    number: str = ""
+    at_least: bool = True
 
 
 @dataclass(frozen=True)
 class Step:
-    """One move of the search or one test of a name, for the log. failed: the test that made the move."""
+    """A move of the search or a test of a name, for the log.
+
+    score: after a move of the search; 0 for a test. failed: the test that made the move. stage: in which it was made.
+    """
 
     what: str
     score: float
     failed: FailedTest | None = None
+    stage: str = ""
 
     @classmethod
     def against(cls, candidate: Candidate, failed: FailedTest, becomes: str = "withdrawn") -> "Step":
