@@ -215,10 +215,13 @@ class Fitter:
         return out
 
     def _target(self, reading: Reading) -> tuple[Columns, Array, Array]:
-        """Columns, the torque (rows, joints) that they have to explain, and one over its scatter (joints,)."""
+        """Columns, the torque (rows, joints) that they have to explain, and one over its scatter (joints,).
+
+        Gravity that is added back makes no error smaller beside it: the scatter is that of what was recorded.
+        """
         columns = self.columns(reading)
-        torque = self.channels.read_torque(reading) - columns.stated - columns.coupled
-        scatter = np.std(torque, axis=0)
+        recorded = self.channels.read_torque(reading) - columns.stated - columns.coupled
+        torque, scatter = recorded + self.channels.added_gravity(reading), np.std(recorded, axis=0)
         return columns, torque, np.where(scatter > 0, 1 / np.where(scatter > 0, scatter, 1.0), 0.0)
 
     def shares(self, reading: Reading, score: Score) -> Array:
@@ -283,7 +286,7 @@ class Fitter:
     def torque_gains(self, reading: Reading) -> list[tuple[float, float]]:
         """Factor between the torque of each joint and that of the links as given, and the share that it explains."""
         columns = self.columns(reading)
-        torque = self.channels.read_torque(reading) - columns.stated
+        torque = self.channels.read_torque(reading) + self.channels.added_gravity(reading) - columns.stated
         given = rigid_body_torque(reading.arm, columns.motion, reading.inertial)
         out = []
         for joint in range(reading.joints):

@@ -104,11 +104,15 @@ class Channels:
         return Motion(position, velocity, acceleration)
 
     def read_torque(self, reading: Reading) -> Array:
-        """Torque of the joints, (rows, joints)."""
+        """Torque of the joints as it was recorded, (rows, joints)."""
         order, out = list(reading.torque_order), np.empty((self.rows, reading.joints))
         for joint, (row, delay) in enumerate(zip(reading.torque, reading.delay, strict=True)):
             out[:, joint] = self.torque_at(float(delay * reading.clock))[:, order] @ row
-        return out + gravity_torque(reading.arm, self.read_motion(reading).position) if reading.adds_gravity else out
+        return out
+
+    def added_gravity(self, reading: Reading) -> Array | float:
+        """What the drive took from it: the gravity of the links of the robot file, (rows, joints), where it did."""
+        return gravity_torque(reading.arm, self.read_motion(reading).position) if reading.adds_gravity else 0.0
 
 
 @dataclass(frozen=True, eq=False)
