@@ -16,7 +16,7 @@ from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.recordings.recording import AnyRun, Finding, MotionRun
 from armlab.recordings.repair import MAX_LOST_SHARE, MAX_USUAL_STEPS, USUAL_STEP_SHARE
-from armlab.recordings.stamps import repair_stamps
+from armlab.recordings.stamps import MAX_ODD_SHARE, repair_stamps
 
 Rows = NDArray[np.intp]
 MIN_DENSITY = 0.75  # of one clock's usual step: between one (rows of one clock) and a half (two clocks)
@@ -75,7 +75,10 @@ def _order(run: MotionRun, rows: Rows) -> list[Rows]:
 
 
 def _is_one_clock(position: Array, time: Array, order: Rows, is_in_order: bool) -> bool:
-    """Whether rows belong in the order of their stamps: one clock's density, and neighbours that are alike."""
+    """Whether rows belong in the order of their stamps: one clock's density, and neighbours that are alike.
+
+    Where most of the order comes from the stamps, no more than a few rows may fit to no side.
+    """
     together = np.diff(order) == 1
     apart = np.diff(np.argsort(order)) != 1  # neighbours in the file that sorting parts
     scale = np.mean(np.abs(np.diff(position, axis=0)), axis=0)
@@ -91,7 +94,22 @@ def _is_one_clock(position: Array, time: Array, order: Rows, is_in_order: bool) 
     forward = np.diff(time[order])
     blocks = forward[: len(forward) // MIN_PART_SAMPLES * MIN_PART_SAMPLES].reshape(-1, MIN_PART_SAMPLES).mean(axis=1)
     is_even = len(blocks) > 0 and blocks.min() >= MIN_DENSITY * np.median(blocks)  # else clocks overlap for a while
-    return bool(is_smooth and is_even and after <= MAX_ROUGHNESS_LEFT * before)
+    lone = _lone_share(scaled[order][position[order].any(axis=1)])  # rows of zeros are left out later
+    return bool(is_smooth and is_even and after <= MAX_ROUGHNESS_LEFT * before and lone <= MAX_ODD_SHARE)
+
+
+def _lone_share(scaled: Array) -> float:
+    """Share of rows that fit to no side, as the few rows of one clock among those of another do.
+
+    scaled: (rows, joints) in the order of time. Both steps of such a row are far longer than usual, and than the step
+    between its neighbours.
+    """
+    if len(scaled) < SMOOTH_LAG:
+        return 0.0
+    steps = np.abs(np.diff(scaled, axis=0)).sum(axis=1)
+    across = np.abs(scaled[2:] - scaled[:-2]).sum(axis=1)
+    shorter = np.minimum(steps[:-1], steps[1:])
+    return float(np.mean(shorter > MAX_USUAL_STEPS * np.maximum(across, steps.mean())))
 
 
 def part_equal_stamps(run: AnyRun) -> AnyRun:

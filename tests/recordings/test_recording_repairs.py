@@ -268,6 +268,12 @@ def test_rows_of_two_episodes_in_no_order_are_refused(tmp_path: Path) -> None:
     assert "do several logs or drivers share the file?" in refusal(loaded, tmp_path, table)
 
 
+def test_a_few_rows_of_another_clock_among_rows_in_no_order_are_refused(tmp_path: Path) -> None:
+    late = frame(1).iloc[:800].sample(n=60, random_state=0)
+    table = pd.concat([frame(0), late.assign(t=late["t"] + 0.4 / RATE_HZ)]).sample(frac=1.0, random_state=0)
+    assert "do several logs or drivers share the file?" in refusal(loaded, tmp_path, table)
+
+
 def test_a_stamp_that_is_wrong_is_not_sorted_into_other_values(tmp_path: Path) -> None:
     table = frame()
     table.loc[900, "t"] = 1.0024
