@@ -20,7 +20,7 @@ from armlab.identification.identify import robot_path, wrong_reading
 from armlab.identification.model import Model
 from armlab.identification.torque_model import TorqueModel
 from armlab.identification.validation import RunError, format_percent, run_error
-from armlab.recordings.identifiable import require_identifiable, require_torque
+from armlab.recordings.identifiable import require_identifiable, require_possible, require_torque
 from armlab.recordings.recording import Recording
 from bench.config import find_algorithm, parse_params
 from bench.execute import Outcome, Trial, run_trial
@@ -137,6 +137,7 @@ def identify(
     wrong = None if as_read else wrong_reading(recording)
     if wrong is not None:
         raise InputError(f"{recording.name}: {wrong.sentence} `as_read=True` identifies it all the same")
+    require_possible(recording)
     identifier = Identifier(recording.arm, components, method, cutoff_hz=cutoff_hz, robot=robot_path(recording))
     try:
         model = identifier.fit(runs).model_
@@ -179,7 +180,7 @@ def predict(model: TorqueModel, recording: Recording) -> Prediction:
     """
     if len(model.arm) != len(recording.arm):
         raise InputError(f"the model has {len(model.arm)} joints, {recording.name} has {len(recording.arm)}")
-    require_torque(recording.runs, recording.arm, recording.name)
+    require_torque(recording)
     errors = tuple(run_error(model, model.signals(run)) for run in recording.runs)
     return Prediction(recording, errors, {run.name: model.predict(run) for run in recording.runs})
 

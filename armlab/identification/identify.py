@@ -36,7 +36,7 @@ from armlab.identification.validation import (
     total_error_line,
 )
 from armlab.recordings.cutoff_trial import choose_cutoff_hz
-from armlab.recordings.identifiable import reason_impossible, require_identifiable, require_torque
+from armlab.recordings.identifiable import require_identifiable, require_possible, require_torque
 from armlab.recordings.load import load_recording
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER, corrected_texts
@@ -171,9 +171,7 @@ def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Res
         raise InputError(f"--tolerance needs nominal `links`, and the robot {recording.arm.name} has none")
     if not options.as_read:
         _refuse_wrong_reading(recording, out)
-    reason = reason_impossible(runs, recording.arm)
-    if reason is not None:
-        raise InputError(f"{folder}: {reason}")
+    require_possible(recording)
     try:
         identifier, how = _build_identifier(recording, options)
         identifier.fit(runs)
@@ -265,7 +263,7 @@ def predict_recording(path: Path, folder: Path, out: Path | None) -> ResultLines
     model, recording = Model.load(path), load_recording(folder)
     if len(model.arm) != len(recording.arm):
         raise InputError(f"{path} is for {len(model.arm)} joints, {folder} has {len(recording.arm)}")
-    require_torque(recording.runs, recording.arm, str(folder))
+    require_torque(recording)
     errors = tuple(run_error(model, model.signals(run)) for run in recording.runs)
     yield error_table(errors)
     written: tuple[Path, ...] = ()

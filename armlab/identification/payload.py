@@ -27,7 +27,7 @@ from armlab.identification.regression import Regression, regression, require_row
 from armlab.identification.selection import counterbalance_groups
 from armlab.identification.structure import Structure
 from armlab.recordings.differentiate import Signals
-from armlab.recordings.identifiable import require_identifiable
+from armlab.recordings.identifiable import require_identifiable, require_possible
 from armlab.recordings.load import load_recording
 from problem.arm import PARAMETER_NAMES, PARAMETER_UNITS, Arm, Link
 from problem.pseudo_inertia import link_from_centre_of_mass, link_of, pseudo_inertias
@@ -243,8 +243,9 @@ class _PayloadTask:
         if len(bare.arm) != len(carrying.arm):
             raise InputError(f"{without} has {len(bare.arm)} joints, {loaded} has {len(carrying.arm)}")
         setting.check(carrying.arm)
-        require_identifiable(carrying)
-        require_identifiable(bare)
+        for each in (carrying, bare):
+            require_identifiable(each)
+            require_possible(each)
         runs = carrying.runs_to_identify(), bare.runs_to_identify()
         cutoff = setting.cutoff_hz or max(map(suggested_cutoff, (*runs[0], *runs[1])))
         signals = ([signals_of(run, cutoff, LOAD_POSITION_FACTOR) for run in each] for each in runs)

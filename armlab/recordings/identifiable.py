@@ -33,27 +33,43 @@ def require_identifiable(*recordings: Recording) -> None:
     A joint may be without torque in one of several recordings: that is a change between them.
     """
     for recording in recordings:
-        reason = reason_still(recording.runs_to_identify()) or reason_copied(recording)
-        if reason is not None:
-            raise InputError(f"{recording.folder}: {reason}")
-    runs = [run for recording in recordings for run in recording.runs_to_identify()]
-    require_torque(runs, recordings[0].arm, " and ".join(str(each.folder) for each in recordings))
-
-
-def require_torque(runs: Sequence[Run], arm: Arm, name: str) -> None:
-    """Raises InputError for runs whose channels are no measurement."""
-    reason = reason_dead(runs, arm)
+        runs = recording.runs_to_identify()
+        _refuse(recording, reason_short(runs) or reason_still(runs) or reason_copied(recording))
+    runs = tuple(run for recording in recordings for run in recording.runs_to_identify())
+    reason = reason_dead(runs, recordings[0].arm)
     if reason is not None:
-        raise InputError(f"{name}: {reason}")
+        raise InputError(f"{' and '.join(str(each.folder) for each in recordings)}: {reason}")
+
+
+def require_possible(*recordings: Recording) -> None:
+    """Raises InputError, in one line, for numbers that no arm could show; asked once units are read rightly."""
+    for recording in recordings:
+        _refuse(recording, reason_impossible(recording.runs, recording.arm))
+
+
+def require_torque(recording: Recording) -> None:
+    """Raises InputError, in one line, for runs with which no torque can be compared; they may be short and stand."""
+    _refuse(recording, reason_dead(recording.runs, recording.arm))
+    require_possible(recording)
+
+
+def _refuse(recording: Recording, reason: str | None) -> None:
+    if reason is not None:
+        raise InputError(f"{recording.folder}: {reason}")
 
 
 def reason_not_identifiable(recording: Recording) -> str | None:
     """The reason in a sentence; None for a recording that can be used. InputError where no run identifies."""
     runs = recording.runs_to_identify()
+    return reason_short(runs) or reason_still(runs) or reason_dead(runs, recording.arm) or reason_copied(recording)
+
+
+def reason_short(runs: Sequence[Run]) -> str | None:
+    """Runs that last too short a time in all."""
     seconds = sum(float(run.time[-1] - run.time[0]) for run in runs)
-    if seconds < MIN_DURATION_S:
-        return f"The runs hold {seconds:.2g} s in all: too short to tell physics from chance; record 10 s or more."
-    return reason_still(runs) or reason_dead(runs, recording.arm) or reason_copied(recording)
+    if seconds >= MIN_DURATION_S:
+        return None
+    return f"The runs hold {seconds:.2g} s in all: too short to tell physics from chance; record 10 s or more."
 
 
 def reason_still(runs: Sequence[Run]) -> str | None:
@@ -95,7 +111,7 @@ def _is_copy(first: Array, second: Array) -> bool:
 
 
 def reason_impossible(runs: Sequence[Run], arm: Arm) -> str | None:
-    """Positions and torques that no arm could show, as the import refuses them; asked once units are read rightly."""
+    """Positions and torques that no arm could show, as the import refuses them."""
     for run in runs:
         low, high = position_range(run.position)
         speeds = usual_speeds(run.position, float(np.median(np.diff(run.time))))

@@ -6,18 +6,18 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from recording_folders import ARM, POSITION, SETTINGS, TORQUE, folder_with, frame
+from recording_folders import POSITION, SETTINGS, TORQUE, folder_with, frame
 from refusals import refusal
 
 from armlab.common.errors import DataError
 from armlab.diagnosis.torque.carried_load import nominal_payload_lines
 from armlab.diagnosis.torque.diagnose import diagnose
+from armlab.flows import identify
 from armlab.identification.identifier import Identifier
 from armlab.identification.identify import IdentifyOptions, identify_recording, predict_recording
 from armlab.identification.payload import PayloadSetting, Place, gains_lines, payload_lines
 from armlab.identification.torque_model import parameter_line
 from armlab.identification.validation import error_table, run_error
-from armlab.recordings.identifiable import reason_impossible
 from armlab.recordings.load import load_recording
 from armlab.report.changes.report import compare_recordings
 
@@ -48,13 +48,35 @@ def still() -> pd.DataFrame:
     return table.assign(**{name: table[name].iloc[0] for name in POSITION})
 
 
+def short() -> pd.DataFrame:
+    return frame(seconds=0.3)
+
+
+def far() -> pd.DataFrame:
+    table = frame()
+    table[POSITION] *= 1e4
+    return table
+
+
+def strong() -> pd.DataFrame:
+    table = frame()
+    table[TORQUE] *= 1e6
+    return table
+
+
 CASES = {
     silent: "is zero throughout: the driver does not fill it",
     one_silent: "The torque of joint 2 is zero throughout: is the right column named?",
     constant: "never changes: is the right column named?",
     copied: "The torque of joints 2 and 3 is the same in every row",
     still: "No joint moves",
+    short: "The runs hold 0.29 s in all: too short to tell physics from chance; record 10 s or more.",
 }
+IMPOSSIBLE = {
+    far: "no arm is there. Which unit is it in?",
+    strong: "more than any drive has. Which unit is it in?",
+}
+READS_UNITS = "payload"  # finds the unit of a torque, where the robot file stands for the arm without the load
 
 
 def identified(folder: Path) -> Path:
@@ -94,12 +116,13 @@ def test_every_command_refuses_what_tells_nothing_in_one_line(made: Callable[[],
     assert CASES[made] in diagnosis.reason
 
 
-def test_a_prediction_asks_for_torque_and_not_for_motion(tmp_path: Path) -> None:
+def test_a_prediction_asks_for_torque_and_not_for_motion_or_length(tmp_path: Path) -> None:
     model = identified(tmp_path)
     for made in (silent, one_silent, constant, copied):
         bad = folder_with(tmp_path / made.__name__, made(), ALONE)
         assert CASES[made] in refusal(run_through, predict_recording(model, bad, None))
-    run_through(predict_recording(model, folder_with(tmp_path / "still", still(), ALONE), None))
+    for made in (still, short):
+        run_through(predict_recording(model, folder_with(tmp_path / made.__name__, made(), ALONE), None))
 
 
 def test_a_joint_without_torque_in_one_of_two_recordings_is_a_change(tmp_path: Path) -> None:
@@ -144,14 +167,21 @@ def test_no_interval_of_no_width_is_printed(tmp_path: Path) -> None:
     assert np.isfinite(fitted.base_values).all()
 
 
-@pytest.mark.parametrize(
-    ("columns", "factor", "said"), [(POSITION, 1e4, "no arm is there"), (TORQUE, 1e6, "any drive")]
-)
-def test_numbers_that_no_arm_has_are_refused_in_a_folder_written_by_hand(
-    tmp_path: Path, columns: list[str], factor: float, said: str
+@pytest.mark.parametrize("made", IMPOSSIBLE, ids=lambda made: made.__name__)
+def test_every_command_refuses_numbers_that_no_arm_has_in_a_folder_written_by_hand(
+    made: Callable[[], pd.DataFrame], tmp_path: Path
 ) -> None:
-    table = frame()
-    table[columns] *= factor
-    (run, *_) = load_recording(folder_with(tmp_path, table)).runs
-    assert said in str(reason_impossible([run], ARM))
-    assert reason_impossible([load_recording(folder_with(tmp_path, frame())).runs[0]], ARM) is None
+    bad, model = folder_with(tmp_path / "bad", made(), ALONE), identified(tmp_path)
+    acts = commands(bad, tmp_path) | {"predict": lambda: run_through(predict_recording(model, bad, None))}
+    for name, act in acts.items():
+        if name != READS_UNITS:
+            assert IMPOSSIBLE[made] in refusal(act), name
+    recording = load_recording(bad)
+    assert IMPOSSIBLE[made] in refusal(identify, recording, as_read=True)
+    assert IMPOSSIBLE[made] in diagnose(recording, as_read=True).reason
+
+
+def test_a_run_that_validates_is_asked_for_impossible_numbers_too(tmp_path: Path) -> None:
+    folder = folder_with(tmp_path / "recording", frame())
+    far().to_csv(folder / "check.csv", index=False)
+    assert IMPOSSIBLE[far] in refusal(run_through, identify_recording(folder, tmp_path / "out", AS_READ))

@@ -17,7 +17,7 @@ from armlab.diagnosis.torque.rows.noise import Noise, fit_noise
 from armlab.effects.contract import Candidate, Scene
 from armlab.effects.model import FittedEffect, torque_in_mechanism
 from armlab.recordings.cutoff import acceleration_spectrum, noise_level
-from armlab.recordings.identifiable import reason_not_identifiable
+from armlab.recordings.identifiable import reason_impossible, reason_not_identifiable
 from armlab.recordings.recording import Recording, Role
 from problem.arm import Arm
 from problem.motion import Motion
@@ -112,7 +112,7 @@ class FirstRun:
 def observe_first_run(recording: Recording, present: PresentModel) -> FirstRun:
     """Filters and thins the runs as a diagnosis does; InputError where a diagnosis could not use them."""
     settings = Settings()
-    reason = reason_not_identifiable(recording)
+    reason = reason_not_identifiable(recording) or reason_impossible(recording.runs, recording.arm)
     observed = None if reason else observe(recording.runs, present.arm, present.inertial, settings)
     reason = reason if observed is None else observed.reason_too_short(present.arm)
     if reason or observed is None:

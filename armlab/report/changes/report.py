@@ -57,7 +57,7 @@ from armlab.diagnosis.torque.names.findings import FRICTION
 from armlab.diagnosis.tuning import ComparisonTuning
 from armlab.effects.library import effect_named
 from armlab.effects.words import place_in_words
-from armlab.recordings.identifiable import require_identifiable
+from armlab.recordings.identifiable import require_identifiable, require_possible
 from armlab.recordings.load import load_recording
 from armlab.report.told.summary import MAX_WORDS
 from armlab.report.torque.content import origin_of
@@ -498,6 +498,7 @@ def compare_recordings(
     first, second, *more = (load_recording(each) for each in folders)
     check_output_folder(out, second)
     require_identifiable(first, second, *more)
+    require_possible(first, second, *more)
     try:
         comparison = compare(first, second, *more, baseline=chosen, seed=seed, dates=dates, progress=progress)
     except DataError as error:
