@@ -1,6 +1,5 @@
 """Every refusal of the import, with the input that causes it: no line of the importers refuses what nobody tried."""
 
-import ast
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -12,6 +11,7 @@ import pandas as pd
 import pytest
 from odd_logs import bag, coarse, in_turn, lists, log
 from recording_folders import IMPORT_OPTIONS, POSITION, TORQUE, frame
+from refusals import lines_passed, refusing_lines
 from scipy.io import savemat
 
 import armlab.recordings.imports
@@ -273,34 +273,16 @@ def test_an_input_is_refused_in_one_line_that_names_the_cause(case: Refusal, tmp
     assert "\n" not in said
 
 
-def sites() -> dict[tuple[str, int], str]:
-    """Where the importers refuse: file and first line of each statement, with its text."""
-    found = {}
-    for path in FOLDER.glob("*.py"):
-        text = path.read_text(encoding="utf-8")
-        for node in ast.walk(ast.parse(text)):
-            if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
-                name = getattr(node.exc.func, "id", "")
-                if name == "InputError":  # the others become questions, whose sentences are in the list
-                    found[path.name, node.lineno] = ast.get_source_segment(text, node) or ""
-    return found
-
-
 def test_every_refusal_of_the_importers_is_caused_by_an_input_of_the_list(tmp_path: Path) -> None:
     exempt = (MISSING_PACKAGE, *OF_COMMANDS)
     known = {
         place: text
-        for place, text in sites().items()
+        for place, text in refusing_lines(FOLDER.glob("*.py")).items()
         if place[0] not in ELSEWHERE and not any(each in text for each in exempt)
     }
     for number, case in enumerate(REFUSALS):
         folder = tmp_path / str(number)
         folder.mkdir()
-        error: BaseException | None = refuse(case, folder)
-        while error is not None:
-            trace = error.__traceback__
-            while trace is not None:
-                known.pop((Path(trace.tb_frame.f_code.co_filename).name, trace.tb_lineno), None)
-                trace = trace.tb_next
-            error = error.__context__
+        for place in lines_passed(refuse(case, folder)):
+            known.pop(place, None)
     assert not known, "\n".join(f"{file}:{line}: {text}" for (file, line), text in known.items())
