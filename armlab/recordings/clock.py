@@ -137,7 +137,9 @@ def require_fine_clock(file: str, time: Array) -> None:
     if len(stamps) >= len(time) / MAX_ROWS_PER_STAMP:
         return
     if len(stamps) == 1:
-        raise InputError(f"{file}: the time stands still at {stamps[0]:g} s: which column holds the time?")
+        raise InputError(
+            f"{file}: the time stands still at {stamps[0]:g} s: which column holds the time, or has it too few digits?"
+        )
     raise InputError(
         f"{file}: {len(time) - len(stamps)} of {len(time)} rows have the stamp of the row before, the time counts in "
         f"steps of {np.median(np.diff(stamps)):g} s: which column holds the fraction of seconds? `recording import "

@@ -18,19 +18,23 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from click.testing import CliRunner
-from recording_folders import ARM, POSITION, TORQUE, frame
+from recording_folders import ARM, POSITION, TORQUE, frame, motion_at
 from scipy.stats import norm
 
 from armlab.cli.main import main
 from armlab.common.markdown import markdown_table
 from armlab.identification.identifier import Identifier
 from armlab.identification.model import Model
+from armlab.identification.priors import point_mass
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Run
+from problem.motion import Motion
+from problem.regressor import observation_matrix, rigid_body_torque
 
 PAGE = Path(__file__).parents[2] / "docs" / "odd-logs.md"
 CUTOFF_HZ = 5.0
 START = pd.Timestamp("2026-01-31T23:59:58.000")
+COUNT_NM = 0.125  # of a servo
 PARAMETERS = 25  # that are identified: 15 base parameters, and what friction and drive add at three joints
 
 
@@ -164,11 +168,11 @@ def _zip(path: Path, content: bytes) -> None:
 def bag(kind: str) -> Callable[[Path], list[Path]]:
     """A ROS 2 bag: `gripper` on the topic of the arm, `halves` of the arm in two messages, `bare` without metadata.
 
-    Halves are of one instant and sent 20 us apart.
+    Halves are of one instant and sent 20 us apart. `named`: its file alone; `file`, `message`: packed by rosbag2.
     """
 
     def write(folder: Path) -> list[Path]:
-        from rosbags.rosbag2 import Writer
+        from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
         from rosbags.typesys import Stores, get_typestore
 
         store, name = get_typestore(Stores.ROS2_HUMBLE), "sensor_msgs/msg/JointState"
@@ -179,7 +183,12 @@ def bag(kind: str) -> Callable[[Path], list[Path]]:
             return store.types[name](header, names, position, np.array([]), effort)
 
         joints = [joint.name for joint in ARM.joints]
-        with Writer(folder / "bag", version=9) as writer:
+        writer = Writer(
+            folder / "bag", version=9, storage_plugin=StoragePlugin.MCAP if kind == "mcap" else StoragePlugin.SQLITE3
+        )
+        if kind in ("file", "message"):
+            writer.set_compression(CompressionMode[kind.upper()], CompressionFormat.ZSTD)
+        with writer:
             topic = writer.add_connection("/joint_states", name, typestore=store)
 
             def put(ns: int, *fields: object) -> None:
@@ -199,6 +208,9 @@ def bag(kind: str) -> Callable[[Path], list[Path]]:
         if kind == "two":
             shutil.copy(next((folder / "bag").glob("*.db3")), folder / "bag" / "other.db3")
             (folder / "bag" / "metadata.yaml").unlink()
+        if kind == "named":
+            (folder / "bag" / "metadata.yaml").unlink()
+            return list((folder / "bag").glob("*.db3"))
         if kind == "packed":
             import zstandard
 
@@ -229,6 +241,28 @@ def lost_ticks(table: pd.DataFrame) -> pd.DataFrame:
     return out
 
 
+def with_sign_bit(table: pd.DataFrame) -> pd.DataFrame:
+    """Torques in counts of an eighth of a N m, 1024 added to the size of a negative one."""
+    counts = np.rint(table[TORQUE] / COUNT_NM)
+    return table.assign(**{name: counts[name].where(counts[name] >= 0, 1024 - counts[name]) for name in TORQUE})
+
+
+def less_gravity(table: pd.DataFrame) -> pd.DataFrame:
+    """Torques of an arm that carries 1.5 kg at link 3, less the gravity of its links."""
+    motion = motion_at(table["t"].to_numpy())
+    still = np.zeros_like(motion.position)
+    gravity = rigid_body_torque(ARM, Motion(motion.position, still, still))
+    load = observation_matrix(ARM, motion)[:, 20:30] @ (1.5 * point_mass(1, (0.1, 0.0, 0.0)))
+    change = pd.DataFrame(load.reshape(gravity.shape) - gravity, columns=TORQUE)
+    return table.assign(**{name: table[name] + change[name] for name in TORQUE})
+
+
+def lines_between(content: str, line: str) -> str:
+    """A text with a line before each hundredth of its lines, its header aside."""
+    head, *rest = content.splitlines(keepends=True)
+    return head + "".join(line + each if n % 100 == 50 else each for n, each in enumerate(rest))
+
+
 def put(column: str, rows: slice, value: object) -> Callable[[pd.DataFrame], pd.DataFrame]:
     def make(table: pd.DataFrame) -> pd.DataFrame:
         out = table.copy().astype({column: object})
@@ -250,6 +284,13 @@ FROM_LOGS = (
         "seconds since 1970 in single precision",
         parquet(lambda table: table.assign(t=(table["t"] + START.timestamp()).astype("float32"))),
         "single precision counts in steps of 128 s",
+        ("--unit", "time=s"),
+        is_read=False,
+    ),
+    OddLog(
+        "seconds since 1970 with six digits",
+        csv("log.csv", lambda table: table.assign(t=[f"{each:.5e}" for each in table["t"] + START.timestamp()])),
+        "or has it too few digits?",
         ("--unit", "time=s"),
         is_read=False,
     ),
@@ -313,6 +354,10 @@ FROM_LOGS = (
         "has no metadata.yaml, so it is no ROS 2 bag as a folder; name one of its files",
         is_read=False,
     ),
+    OddLog("the one file of such a folder", bag("named"), "joint states; rad, rad/s and N.m"),
+    OddLog("a bag whose file rosbag2 packed with zstd", bag("file"), "joint states; rad, rad/s and N.m"),
+    OddLog("a bag whose messages rosbag2 packed with zstd", bag("message"), "joint states; rad, rad/s and N.m"),
+    OddLog("a bag as MCAP", bag("mcap"), "joint states; rad, rad/s and N.m"),
     OddLog("a bag packed with zstd, .db3.zstd", bag("packed"), "joint states; rad, rad/s and N.m"),
     OddLog("stamps in ISO 8601 with Z", csv("log.csv", stamps(lambda s: s.dt.strftime(ISO + "Z"))), "t is ISO 8601"),
     OddLog("with +01:00", csv("log.csv", stamps(lambda s: s.dt.strftime(ISO + "+01:00"))), "t is ISO 8601"),
@@ -356,6 +401,53 @@ FROM_LOGS = (
         "a tenth of the torque's cells empty",
         csv("log.csv", lambda table: table.assign(tau2=table["tau2"].where(table.index % 10 > 0))),
         "320 of 3200 rows hold a value that is not a measurement",
+    ),
+    OddLog(
+        "a load in counts, as a size with a bit for its direction",
+        csv("log.csv", with_sign_bit),
+        "the current of channel 1 holds its direction in bit 10",
+        ("--unit", "position=rad", "--unit", "torque=A", "--gains", ",".join([str(COUNT_NM)] * 3)),
+    ),
+    OddLog(
+        "torque without its sign",
+        csv("log.csv", lambda table: table.assign(**{name: table[name].abs() for name in TORQUE})),
+        "the recorded current has no sign: it is a magnitude",
+        is_read=False,
+        command="identify",
+    ),
+    OddLog(
+        "torque less the gravity of the arm's links, while 1.5 kg are carried",
+        csv("log.csv", less_gravity),
+        "the gravity of the links of the robot file is taken from the recorded torque",
+        is_read=False,
+        command="identify",
+    ),
+    OddLog("CR CR LF line ends", text("log.csv", lambda s: s.replace("\n", "\r\r\n")), "3200 rows"),
+    OddLog("blank lines", text("log.csv", lambda s: lines_between(s, "\n")), "3200 rows"),
+    OddLog(
+        "the header again between rows",
+        text("log.csv", lambda s: lines_between(s, s[: s.index("\n") + 1])),
+        "3232 rows",
+    ),
+    OddLog("quotes around numbers", text("log.csv", lambda s: frame_of(s).to_csv(index=False, quoting=1)), "3200 rows"),
+    OddLog("a column that counts rows", text("log.csv", lambda s: frame_of(s).to_csv()), "3200 rows"),
+    OddLog(
+        "a column that stands there twice", csv("log.csv", lambda table: table.assign(copy=table["q1"])), "3200 rows"
+    ),
+    OddLog(
+        "semicolons and decimal commas",
+        text("log.csv", lambda s: frame_of(s).to_csv(index=False, sep=";", decimal=",")),
+        "separator semicolon, decimal ','",
+    ),
+    OddLog(
+        "a pause of 100 s",
+        csv("log.csv", lambda table: pd.concat([table.iloc[:1500], log(1).assign(t=log(1)["t"] + 110.0)])),
+        "1 gap(s), first after 7.495 s",
+    ),
+    OddLog(
+        "a clock with 150 ticks a second for 200 rows",
+        csv("log.csv", lambda table: coarse(table, 150.0)),
+        "stamps stray from an even 200 Hz",
     ),
     OddLog("byte order mark, CR line ends", text("log.csv", lambda s: "\ufeff" + s.replace("\n", "\r")), "3200 rows"),
     OddLog("UTF-16", text("log.csv", lambda s: s.encode("utf-16")), "3200 rows"),
@@ -425,6 +517,86 @@ BROKEN = (
 )
 
 
+REPORTED = {  # threads on GitHub in which people describe such logs
+    "unitreerobotics/unitree_lerobot#41, huggingface/lerobot#933": (
+        "2 episodes of equal length, each from 0 s",
+        "3 episodes of equal length",
+        "4 episodes of equal length",
+        "episodes of different lengths",
+    ),
+    "open-mmlab/mmdetection3d#296, facebookresearch/polymetis#3": (
+        "seconds since 1970 in single precision",
+        "seconds since 1970 with six digits",
+    ),
+    "Minipada/ros2_data_collection#308": (
+        "whole seconds of a stamp alone",
+        "seconds and nanoseconds in two columns",
+    ),
+    "ros-controls/gz_ros2_control#169, gazebosim/gz-sim#883": (
+        "effort zero at all joints",
+        "effort zero at one joint",
+        "torque constant at all joints",
+        "an arm that stands still",
+    ),
+    "moveit/moveit_ros#286, ros-industrial/motoman#59": (
+        "arm and gripper in messages of their own on one topic",
+        "the arm in two messages on one topic",
+    ),
+    "grafana/grafana-csv-datasource#298, facontidavide/PlotJuggler#1220": (
+        "stamps in ISO 8601 with Z",
+        "with +01:00",
+        "with a blank",
+        "as dd.mm.yyyy",
+        "as hh:mm:ss.mmm over midnight",
+        "date and time in two columns",
+    ),
+    "facontidavide/PlotJuggler#71, facontidavide/PlotJuggler#1038": (
+        "positions and torques in alternate rows",
+        "torques at a quarter of the rate",
+        "a tenth of the torque's cells empty",
+    ),
+    "UniversalRobots/Universal_Robots_ROS2_Driver#1551, UniversalRobots/Universal_Robots_ROS_Driver#160, #286": (
+        "torque less the gravity of the arm's links, while 1.5 kg are carried",
+    ),
+    "ros2/rosbag2#395, ros2/rosbag2#2445": (
+        "a bag's folder without metadata.yaml",
+        "the same with two files",
+        "the one file of such a folder",
+        "a bag whose file rosbag2 packed with zstd",
+        "a bag whose messages rosbag2 packed with zstd",
+        "a bag as MCAP",
+        "a bag packed with zstd, .db3.zstd",
+    ),
+    "huggingface/lerobot#1014": (
+        "a load in counts, as a size with a bit for its direction",
+        "torque without its sign",
+    ),
+    "facontidavide/PlotJuggler#46": (
+        "byte order mark, CR line ends",
+        "CR CR LF line ends",
+        "blank lines",
+        "the header again between rows",
+        "quotes around numbers",
+        "a column that counts rows",
+        "a column that stands there twice",
+        "semicolons and decimal commas",
+        "a pause of 100 s",
+        "a clock with 150 ticks a second for 200 rows",
+    ),
+    "robfiras/loco-mujoco#8, kjyv/FloBaRoID#5": (
+        "UTF-16",
+        "Windows-1252",
+        ".csv.gz",
+        ".zip of one file",
+        ".json, a list of rows",
+        ".json, lists by name",
+        ".jsonl",
+        ".npz",
+        "Parquet with vectors in its cells, as of a LeRobot dataset",
+    ),
+}
+
+
 MAX_DEVIATION = largest_by_chance(len(FROM_LOGS) + len(BROKEN))
 
 
@@ -467,7 +639,7 @@ def run_log(case: OddLog, folder: Path) -> Outcome:
     done = CliRunner().invoke(main, ["recording", "import", *map(str, files), *given])
     said = done.output
     if case.command == "identify" and done.exit_code == 0:
-        done = CliRunner().invoke(main, ["identify", str(out), "--out", str(folder / "model"), "--as-read"])
+        done = CliRunner().invoke(main, ["identify", str(out), "--out", str(folder / "model")])
         said = done.output
     found = said.splitlines() or [""]
     deviation = None
@@ -507,24 +679,29 @@ def largest_deviation(model: Model, plain: Model) -> float:
 
 
 def rows_of(cases: tuple[OddLog, ...]) -> list[list[str]]:
+    """A row a log: what it is, who reports such logs, and what is made of it."""
+    threads = {what: thread for thread, logs in REPORTED.items() for what in logs}
     rows = []
     for case in cases:
         with tempfile.TemporaryDirectory() as folder:
             outcome = run_log(case, Path(folder))
         numbers = "–" if outcome.deviation is None else f"{outcome.deviation:.2f}"
         status = "refused" if outcome.exit_status else "read"
-        rows.append([case.what, status, f"`{outcome.line.removeprefix('armlab: ')}`", numbers])
+        rows.append(
+            [case.what, threads.get(case.what, "–"), status, f"`{outcome.line.removeprefix('armlab: ')}`", numbers]
+        )
     return rows
 
 
 def page() -> str:
     """`docs/odd-logs.md`."""
-    headings = ["log", "outcome", "the line that says it", "numbers off by"]
+    headings = ["log", "reported in", "outcome", "the line that says it", "numbers off by"]
     return (
         "# Odd and broken logs\n\n"
         "What `armlab recording import` does with logs as robots write them, and `armlab identify` where the log is "
         "read and nothing can be identified from it. Written by `python tests/recordings/odd_logs.py`; a test runs "
-        "each row. Last column: the largest deviation of any identified number from that of the same log in the "
+        "each row. Second column: threads on GitHub, owner/repository#number, in which people describe such logs. Last "
+        "column: the largest deviation of any identified number from that of the same log in the "
         "plainest form, in half widths of the 95 % intervals of both. The test asks for less than "
         f"{MAX_DEVIATION:.2f}: by chance, no number of {len(FROM_LOGS) + len(BROKEN)} logs exceeds that in 95 of 100 "
         "trials.\n\n"

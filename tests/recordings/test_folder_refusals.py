@@ -62,7 +62,10 @@ def run_entry(**keys: Any) -> dict[str, Any]:
 
 REFUSALS = (
     Refusal("do several logs or drivers share the file? Import them apart", shuffled),
-    Refusal("the time stands still at 3 s: which column holds the time?", lambda each: each.assign(t=3.0)),
+    Refusal(
+        "the time stands still at 3 s: which column holds the time, or has it too few digits?",
+        lambda each: each.assign(t=3.0),
+    ),
     Refusal("1592 of 1600 rows have the stamp of the row before", lambda each: each.assign(t=np.floor(each["t"]))),
     Refusal("more than a tenth", with_gaps),
     Refusal("49 samples in a row at most; at least 50 are needed", lambda each: each.iloc[:49]),
