@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from recording_folders import POSITION, SETTINGS, TORQUE, folder_with, frame
+from recording_folders import IMPORT_OPTIONS, POSITION, SETTINGS, TORQUE, folder_with, frame
 from refusals import refusal
 
 from armlab.common.errors import DataError
@@ -18,6 +18,7 @@ from armlab.identification.identify import IdentifyOptions, identify_recording, 
 from armlab.identification.payload import PayloadSetting, Place, gains_lines, payload_lines
 from armlab.identification.torque_model import parameter_line
 from armlab.identification.validation import error_table, run_error
+from armlab.recordings.imports.files import import_files
 from armlab.recordings.load import load_recording
 from armlab.report.changes.report import compare_recordings
 
@@ -185,3 +186,12 @@ def test_a_run_that_validates_is_asked_for_impossible_numbers_too(tmp_path: Path
     folder = folder_with(tmp_path / "recording", frame())
     far().to_csv(folder / "check.csv", index=False)
     assert IMPOSSIBLE[far] in refusal(run_through, identify_recording(folder, tmp_path / "out", AS_READ))
+
+
+def test_an_import_says_what_cannot_be_identified_from_what_it_writes(tmp_path: Path) -> None:
+    said = {short: CASES[short], still: CASES[still], one_silent: CASES[one_silent], copied: CASES[copied]}
+    for made, sentence in said.items():
+        made().to_csv(tmp_path / "log.csv", index=False)
+        options = {**IMPORT_OPTIONS, "units": ("position=rad", "torque=N.m")}
+        imported = import_files([tmp_path / "log.csv"], tmp_path / made.__name__, options)
+        assert any(sentence in line for line in imported.lines)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from armlab.common.documents import Document
 from armlab.common.errors import InputError
-from armlab.recordings.identifiable import has_no_torque, reason_copied, reason_dead, reason_still
+from armlab.recordings.identifiable import has_no_torque, reason_dead, reason_not_identifiable
 from armlab.recordings.imports.gears import Gear
 from armlab.recordings.imports.packed import PACKED_SUFFIXES
 from armlab.recordings.imports.plan import ImportPlan, plan_import
@@ -152,7 +152,7 @@ def _read_written(folder: Path, shares_stamps: bool) -> tuple[tuple[tuple[str, s
         raise InputError(f"{runs[0].file}: {reason_dead(runs, recording.arm)}")
     if shares_stamps:
         require_one_instant(runs, recording.arm)
-    reason = reason_still(runs) or reason_dead(runs, recording.arm) or reason_copied(recording)
+    reason = reason_not_identifiable(recording) if recording.with_role("identify") else None
     return _repairs_of(recording.runs), () if reason is None else (reason,)
 
 
