@@ -39,5 +39,5 @@ def refuse_other_drives(model: Any, joints: Iterable[int], path: Path) -> None:
         if reason is not None:
             raise InputError(
                 f"{path}: the actuator of joint '{joint_name(model, joint)}' {reason}: the recording needs columns of "
-                "torque, or the key `controller` with the drive that took the commands"
+                "torque, or the key `controller` of recording.yaml with the drive that took the commands"
             )
