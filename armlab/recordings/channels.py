@@ -72,7 +72,8 @@ def _from_first_stamp(time: Array, file: str) -> tuple[Array, tuple[Finding, ...
     Raises InputError for stamps that single precision cannot tell apart.
     """
     known = np.unique(time[np.isfinite(time)])
-    largest = np.float32(min(np.abs(known).max(initial=0.0), float(np.finfo(np.float32).max)))
+    bound = float(np.finfo(np.float32).max) / 2  # the spacing of the largest number overflows
+    largest = np.float32(min(np.abs(known).max(initial=0.0), bound))
     spacing, finest = float(np.spacing(largest)), np.diff(known).min(initial=np.inf)
     is_coarse = spacing > 1 / SLOWEST_HZ if len(known) == 1 else spacing >= finest
     if len(time) > 1 and len(known) <= len(time) / 2 and is_coarse and np.all(np.mod(known, spacing) == 0):

@@ -77,6 +77,7 @@ REFUSALS = (
     Refusal("320 of 1600 rows hold zeros alone", with_zeros),
     Refusal("holds no row: its time runs from 0 s to 7.995 s", settings=run_entry(exclude=[[20.0, 30.0]])),
     Refusal("single precision counts in steps of 128 s there", in_single_precision),
+    Refusal("1600 of 1600 rows hold a value that is not", lambda each: each.assign(t=1e300 * (1 + each["t"]))),
     Refusal("unknown signal: did you mean 'torque'?", settings={"units": {**UNITS, "torqe": "N.m"}}),
     Refusal("is A or V: `gains` (N.m per A or V) are missing", settings={"units": {**UNITS, "torque": "A"}}),
     Refusal(
