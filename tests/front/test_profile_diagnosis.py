@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+from armlab.diagnosis.torque.stages import BY_PROBABILITY, BY_TESTS
 from tools.profile_diagnosis import STAGES, FunctionTime, StageClock, function_lines
 
 
@@ -20,6 +21,7 @@ def test_seconds_belong_to_the_stage_that_runs_and_to_none_twice():
 def test_every_stage_begins_with_a_message_that_a_diagnosis_tells():
     sources = "".join(path.read_text(encoding="utf-8") for path in Path("armlab").rglob("*.py"))
     told = re.findall(r"progress\(f?\"([^\"]+)\"\)", sources)
+    told += [stage.message for stage in (*BY_TESTS, *BY_PROBABILITY)]
     assert [start for start in STAGES if not any(message.startswith(start) for message in told)] == []
 
 
