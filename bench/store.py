@@ -3,6 +3,7 @@ salvage of a damaged one.
 """
 
 import sqlite3
+import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import fields
@@ -35,6 +36,7 @@ _LATER_TABLES = (  # stores of older releases have none
 _BEST_X = "best_x"
 _BYTES_PER_NUMBER = 8
 _LOCK_TIMEOUT_S = 60.0
+_LOCK_PAUSE_S = 0.02
 
 
 class OutcomeFigures(NamedTuple):
@@ -170,8 +172,21 @@ def _prepare_schema(connection: sqlite3.Connection, path: Path) -> None:
         _check_header(sql, path)
         for statement in _LATER_TABLES:
             sql.execute(statement)
-    connection.execute("PRAGMA journal_mode = WAL")
+    _write_ahead(connection)
     connection.execute("PRAGMA synchronous = FULL")  # in WAL mode less would lose the last commits with the power
+
+
+def _write_ahead(connection: sqlite3.Connection) -> None:
+    """Turn the journal to WAL; SQLite does not wait for others that open a new store just then, so this does."""
+    last = time.monotonic() + _LOCK_TIMEOUT_S
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode = WAL")
+            return
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > last:
+                raise
+        time.sleep(_LOCK_PAUSE_S)
 
 
 def _check_header(sql: sqlite3.Connection, path: Path) -> None:
