@@ -41,9 +41,9 @@ class Belief:
         return self.model.design.settings.tuning
 
     def with_state(self, state: State, *steps: Step) -> "Belief":
-        """The same model in another state, with more steps in its log."""
+        """The belief with its model in another state, and more steps in its log."""
         return replace(self, model=replace(self.model, state=state, steps=(*self.model.steps, *steps)))
 
     def with_steps(self, *steps: Step) -> "Belief":
-        """The same with more steps in its log."""
+        """The belief with more steps in its log."""
         return self.with_state(self.model.state, *steps)

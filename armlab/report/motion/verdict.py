@@ -33,11 +33,11 @@ from armlab.diagnosis.motion.robot_learning import isaac_lab_text, mjlab_text
 from armlab.diagnosis.motion.ros2_control import controllers_text, ros_urdf_text
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
 from armlab.diagnosis.settings import Settings
-from armlab.diagnosis.torque.names.names_file import names_texts
 from armlab.diagnosis.tuning import NamingTuning
 from armlab.effects.library import effect_named
 from armlab.report.motion.told import ToldNumber, causes_told, told_numbers
 from armlab.report.motion.words import summary_of
+from armlab.report.torque.names_file import names_texts
 from problem.robot_file import built_in_arms
 
 MODEL, SIMULATION = "model.yaml", "simulation.xml"

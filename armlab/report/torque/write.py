@@ -15,13 +15,13 @@ from armlab.common.report.printed_table import table_files
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Settings, guards_without, vary
 from armlab.diagnosis.torque.diagnose import diagnose
-from armlab.diagnosis.torque.names.names_file import names_texts
 from armlab.diagnosis.tuning import parse_change
 from armlab.recordings.load import load_recording
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER
 from armlab.report.signals_file import SIGNALS_FILE, check_signals_writer, diagnosis_tracks, signals_content
 from armlab.report.torque import content, measured
 from armlab.report.torque.gallery import Gallery, draw_gallery
+from armlab.report.torque.names_file import names_texts
 from armlab.report.torque.residuals import select_residuals
 from armlab.report.torque.steps_file import parse_place, steps_texts, why_lines
 from armlab.report.torque.verdict import first_screen, verdict_lines

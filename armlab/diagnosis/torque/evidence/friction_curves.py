@@ -17,7 +17,7 @@ from armlab.diagnosis.torque.search.search import Search, Step, rival_formulas
 
 
 def find_friction_curves(belief: Belief) -> Belief:
-    """The same with a curve in the place of a joint's friction where it is clearly better than every formula.
+    """The belief with a curve in the place of a joint's friction where it is clearly better than every formula.
 
     A curve beside the formulas of a search would take their place before their shapes are known. Here a curve that
     fails a test changes nothing.

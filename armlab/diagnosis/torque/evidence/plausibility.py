@@ -32,8 +32,9 @@ ROUNDING = 1e-9  # of a link's torque at the joint that shows it best: a joint w
 
 
 def withdraw_implausible(belief: Belief) -> Belief:
-    """The same without laws of friction whose numbers cannot be believed, the weakest first, special laws before usual
-    ones: usual friction takes their place. Then the search looks once more.
+    """The belief without laws of friction whose numbers no engineer believes: usual friction takes their place.
+
+    The weakest leaves first, special laws before usual ones. Then the search looks once more.
 
     Another effect of which that is so stays in the model without a claim, see `unclaim_implausible`. All are kept
     without the guard `physics_signs`.

@@ -96,12 +96,12 @@ def _search_again(belief: Belief, fixed: bool) -> Belief:
 
 
 def test_again(belief: Belief) -> Belief:
-    """The same without what no longer passes, see `withdraw`."""
+    """The belief without what no longer passes, see `withdraw`."""
     return withdraw(belief, {})
 
 
 def withdraw(belief: Belief, failed: Mapping[int, FailedTest], before: frozenset[int] = frozenset()) -> Belief:
-    """The same without some groups, and without what no longer passes; usual friction in the place of special laws.
+    """The belief without some groups, and without what no longer passes; usual friction in the place of special laws.
 
     failed: why, for each group. before: groups that were withdrawn earlier; nor do they come back.
     """
@@ -115,7 +115,7 @@ def withdraw(belief: Belief, failed: Mapping[int, FailedTest], before: frozenset
 
 
 def look_again(belief: Belief, withdrawn: frozenset[int]) -> Belief:
-    """The same with what a search finds beside it, where all of that passes and is more likely in the end.
+    """The belief with what a search finds beside it, where all of that passes and is more likely in the end.
 
     withdrawn: groups of whose places nothing is looked for.
     """
@@ -130,7 +130,7 @@ def look_again(belief: Belief, withdrawn: frozenset[int]) -> Belief:
 
 
 def scan_what_is_left(belief: Belief) -> Belief:
-    """The same with what scans find in what it leaves, where that passes, too, and is more likely in the end.
+    """The belief with what scans find in what it leaves, where that passes, too, and is more likely in the end.
 
     The first scans looked at what links and plain friction leave: what had no name then can hide a gap or a push. Nor
     were they, or the last round, made with the links that passed: a gap is crossed where the load of these is zero.

@@ -137,7 +137,7 @@ def remaining(belief: Belief) -> tuple[Structure, ...]:
 
 
 def with_what_is_left(belief: Belief) -> Belief:
-    """The same with the structure that surrogates find in what its model leaves."""
+    """The belief with the structure that surrogates find in what its model leaves."""
     return replace(belief, left=predict_residual_structure(belief.model, fit_coloured_noise(belief.model)))
 
 

@@ -19,7 +19,7 @@ from armlab.diagnosis.torque.search.search import Search, Step
 
 
 def claim_expected_parts(belief: Belief) -> Belief:
-    """The same with usual friction and offsets of joints that have none, where leaving them out costs much held out.
+    """The belief with usual friction and offsets of joints that have none, where leaving them out costs much held out.
 
     All friction of a joint is tested at once, without a correction for
     what else was looked at; it is missed by more than a minor change instead.
