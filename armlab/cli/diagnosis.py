@@ -88,7 +88,7 @@ def diagnose(
     if old is not None and is_motion_only(old) != motion_only:
         raise InputError("--compare: one recording has torque, the other is motion only; they cannot be compared")
     if motion_only and old is None:
-        from armlab.report.motion.write import diagnose_motion_recording
+        from armlab.report.motion.motion_write import diagnose_motion_recording
 
         return diagnose_motion_recording(recordings[0], out, tell_progress, changes, mcap, tables, verbose)
     if motion_only and old is not None:
@@ -96,7 +96,7 @@ def diagnose(
 
         return compare_motion_recordings((old, *recordings), out, tell_progress)
     if old is not None:
-        from armlab.report.changes.report import compare_recordings
+        from armlab.report.changes.comparison_report import compare_recordings
 
         return compare_recordings((old, *recordings), out, baseline, seed, _parse_dates(dates), tell_progress)
     from armlab.report.torque.write import diagnose_recording

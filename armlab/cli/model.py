@@ -106,6 +106,6 @@ def confusability(
     ROBOT: a file or a built-in name. TRAJECTORY: a CSV with t, q1, ... in s and rad, a recording folder, or the name
     of a trajectory in results/best_known.json.
     """
-    from armlab.report.confusability.report import write_card
+    from armlab.report.confusability.confusability_report import write_card
 
     return write_card(robot, trajectory, joints, noise, out)

@@ -10,8 +10,8 @@ from typing import get_args
 from armlab.common.documents import ResultLines
 from armlab.common.errors import InputError
 from armlab.common.files import refuse_inputs, write_texts
-from armlab.diagnosis.next.card import card_content, card_lines, draw_card
 from armlab.diagnosis.next.experiment import Experiment, design_experiment
+from armlab.diagnosis.next.experiment_card import card_content, card_lines, draw_card
 from armlab.diagnosis.next.motion import Budget
 from armlab.diagnosis.next.prepare import LinkKnowledge
 from bench.trajectory_files import TRAJECTORY_FORMATS, sample_trajectory

@@ -47,10 +47,10 @@ def calibrate_names(
     of one together (extra `calibrate`).
     """
     from armlab.diagnosis.choice import Example
-    from armlab.proof.blind.real.weighed import read_weighed_real
-    from armlab.proof.blind.score.weighed import read_weighed
-    from armlab.proof.blind.servo.score import read_weighed_motion
-    from armlab.proof.open.calibration.calibrate import Finding, calibrate
+    from armlab.proof.blind.real.real_names import read_weighed_real
+    from armlab.proof.blind.score.weighed_names import read_weighed
+    from armlab.proof.blind.servo.servo_score import read_weighed_motion
+    from armlab.proof.open.calibration.calibrate import ExampleFinding, calibrate
     from armlab.proof.open.calibration.calibration_page import calibration_lines, write_calibration
 
     if not sets and not motion_sets and not real_sets:
@@ -61,7 +61,7 @@ def calibrate_names(
     weighed = [(each, "") for _, found in simulated for each in found]
     weighed += [(each, recording) for _, found in real for recording, each in found]
     findings = [
-        Finding(each.case, each.tier, Example(each.names, each.right), each.background, recording)
+        ExampleFinding(each.case, each.tier, Example(each.names, each.right), each.background, recording)
         for each, recording in weighed
     ]
     found = calibrate(findings)
@@ -192,7 +192,7 @@ def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int)
 
     from armlab.cli.second_motion import plan_second_motion
     from armlab.proof.blind.loop.case import Tools
-    from armlab.proof.blind.loop.page import Seals, write_page
+    from armlab.proof.blind.loop.loop_page import Seals, write_page
     from armlab.proof.blind.loop.run import LoopSettings, close_loop, play_cases, read_results, seal_loop
     from armlab.proof.open.second_motion import suspect_rivals, write_diagnosis
 
@@ -228,10 +228,8 @@ def likeness(
     from armlab.common.errors import InputError
     from armlab.common.files import write_texts
     from armlab.proof.blind.sealed import code_commit
-    from armlab.proof.open.likeness.page import likeness_texts
-    from armlab.proof.open.likeness.pictures import Pictured, draw_pictures
-    from armlab.proof.open.likeness.real_arms import drawable_folders, real_folders
-    from armlab.proof.open.likeness.study import (
+    from armlab.proof.open.likeness.likeness_page import likeness_texts
+    from armlab.proof.open.likeness.look import (
         LOOKS_FILE,
         compare,
         look_of,
@@ -240,6 +238,8 @@ def likeness(
         read_real_arms,
         read_simulated_arms,
     )
+    from armlab.proof.open.likeness.pictures import Pictured, draw_pictures
+    from armlab.proof.open.likeness.real_arms import drawable_folders, real_folders
     from armlab.proof.tiers.likeness_sets import make_field_nulls, make_realistic_nulls
     from armlab.recordings.public import LOCAL_COPIES_VARIABLE, local_copies
 

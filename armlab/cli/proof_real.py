@@ -63,7 +63,7 @@ def real(
     --leave-one-out leave_one_out.md and .csv instead.
     """
     from armlab.proof.open.real_arms.leave_one_out import leave_arms_out
-    from armlab.proof.open.real_folders.bench import FolderBench
+    from armlab.proof.open.real_folders.all_folders import FolderBench
     from armlab.proof.open.real_folders.parts import PublicBench, bench_real
     from armlab.recordings.public import local_copies
 
@@ -90,7 +90,7 @@ def real_motion(results: Path, recordings: Path, peer: str | None, peer_windows:
     An SO-101 arm against its public MJCF, and an XL330 servo at four gains, pair by pair. Writes motion.md.
     """
     from armlab.proof.open.motion.peer import WINDOWS
-    from armlab.proof.open.motion.real import bench_real_motion
+    from armlab.proof.open.motion.public_servos import bench_real_motion
 
     if peer is None and peer_windows is not None:
         raise InputError("--peer-windows has no part without --peer sysid: give both")
@@ -166,7 +166,7 @@ def real_conditioning(results: Path, recordings: Path, only: tuple[str, ...]) ->
     Identifies each public recording from many windows and predicts the runs that validate. Writes conditioning.md,
     two tables and a picture.
     """
-    from armlab.proof.open.conditioning.study import study_conditioning
+    from armlab.proof.open.conditioning.conditioning_study import study_conditioning
 
     return study_conditioning(results, recordings, only, tell_progress)
 
@@ -187,7 +187,7 @@ def relations(
     others. Writes relations.md; an interrupted command continues. Parts: the short relations, or those of stretches
     that are independent of each other, between which nothing has changed (null-pairs.md).
     """
-    from armlab.proof.open.relations.bench import bench_relations
+    from armlab.proof.open.relations.all_relations import bench_relations
     from armlab.proof.open.relations.relations import NULL_PAIRS, QUICK, RELATIONS
 
     names = {"all": tuple(RELATIONS), "quick": QUICK, "null-pairs": NULL_PAIRS}[part]

@@ -133,7 +133,7 @@ class Claim:
     probability: of its name; members: of its class, the likeliest first, where the name alone is not probable enough.
     left_out: the part of its torque that the model found does not predict. simulated: its scalar parameters as the
     simulation has them, where it has a law of this kind there, to which the finding adds. removal: of it alone from the
-    model found. minor: of no practical size, or not among the findings that are told (`armlab.report.told`).
+    model found. minor: of no practical size, or not among the findings that are told (`armlab.report.account`).
     """
 
     effect: str

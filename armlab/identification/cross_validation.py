@@ -61,7 +61,7 @@ GRAM_RIDGE = 1e-9  # of a column's power: above the rounding of the products, be
 
 
 @dataclass(frozen=True, eq=False)
-class Moments:
+class RowMoments:
     """gram (joints, columns, columns), cross (joints, columns), power (joints,) of rows, samples many."""
 
     gram: Array
@@ -102,20 +102,20 @@ def _solve_scaled(gram: Array, cross: Array) -> Array:
         return np.asarray(pinvh((scaled + scaled.T) / 2, rtol=GRAM_RIDGE) @ (cross / scale) / scale)
 
 
-def regression_moments(data: Regression) -> Moments:
+def regression_moments(data: Regression) -> RowMoments:
     """The moments of all rows."""
     matrix = data.matrix.reshape(data.samples, data.joints, -1)
     gram = np.stack([matrix[:, joint].T @ matrix[:, joint] for joint in range(data.joints)])
     cross = np.einsum("tjp,tj->jp", matrix, data.torques)
-    return Moments(gram, cross, np.sum(data.torques**2, axis=0), data.samples)
+    return RowMoments(gram, cross, np.sum(data.torques**2, axis=0), data.samples)
 
 
 @dataclass(frozen=True, eq=False)
 class FoldMoments:
     """Moments of the folds: to fit, and to judge."""
 
-    fit: tuple[Moments, ...]
-    judge: tuple[Moments, ...]
+    fit: tuple[RowMoments, ...]
+    judge: tuple[RowMoments, ...]
 
     def held_out_error(self, columns: Sequence[int], prior: Prior | None, by_joint: bool) -> float:
         """||tau - tau_hat|| / ||tau|| over the held-out blocks."""

@@ -188,7 +188,7 @@ def _model_with_links(known: TorqueModel, arm: Arm, inertial: Array | None) -> T
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class ExportedBody:
     """One moving body and its joint, in SI units.
 
     origin: pose (4, 4) of the joint in the frame of the body before. centre: (3,), inertia: (3, 3) about it,
@@ -209,7 +209,7 @@ class Body:
     armature: float
 
 
-def bodies(simulated: SimulatorModel) -> tuple[Body, ...]:
+def bodies(simulated: SimulatorModel) -> tuple[ExportedBody, ...]:
     """The bodies of a model; InputError where it has no links or one that no simulator takes, or coupled joints."""
     refuse_coupled(simulated.model.arm, "a chain of bodies alone")
     origin, out = np.eye(4), []
@@ -217,7 +217,7 @@ def bodies(simulated: SimulatorModel) -> tuple[Body, ...]:
         mass, centre, inertia = body_numbers(transform_pseudo_inertia(total, joint.after))
         limits = joint.limits
         out.append(
-            Body(
+            ExportedBody(
                 joint.name,
                 joint.kind,
                 origin @ joint.before,
@@ -311,7 +311,7 @@ def _rotation_to_upright(gravity: tuple[float, float, float]) -> Array:
     return inverse(turn_z_to(-np.array(gravity))) if np.any(gravity) else np.eye(4)
 
 
-def _add_link(root: ElementTree.Element, body: Body, parent: str, name: str) -> str:
+def _add_link(root: ElementTree.Element, body: ExportedBody, parent: str, name: str) -> str:
     link = ElementTree.SubElement(root, "link", name=name)
     link.append(inertial_element(body.mass, body.centre, body.inertia))
     limited = bool(np.all(np.isfinite(body.limits)))
@@ -401,7 +401,7 @@ def mjcf_document(simulated: SimulatorModel) -> str:
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _add_body(parent: ElementTree.Element, body: Body, number: int) -> ElementTree.Element:
+def _add_body(parent: ElementTree.Element, body: ExportedBody, number: int) -> ElementTree.Element:
     quaternion = Rotation.from_matrix(body.origin[:3, :3]).as_quat(scalar_first=True)
     pose = {"pos": format_numbers(body.origin[:3, 3]), "quat": format_numbers(quaternion)}
     node = ElementTree.SubElement(parent, "body", {"name": f"link{number}", **pose})

@@ -89,7 +89,7 @@ class Place:
 
 
 @dataclass(frozen=True, eq=False)
-class Payload:
+class IdentifiedLoad:
     """A load: parameters (10,) about its link's frame, of a body that can exist; covariance (10, 10).
 
     factor: from a standard error to half of a 95 % interval. The covariance is that of a fit without the condition
@@ -138,7 +138,7 @@ class TorqueGains:
 
 def identify_payload(
     structure: Structure, without: Sequence[Signals], loaded: Sequence[Signals], place: Place | None = None
-) -> Payload:
+) -> IdentifiedLoad:
     """The load that some runs carry and others do not, as the body that can exist and explains them best.
 
     Raises ValueError where runs of either kind are missing, or where these motions do not determine the parameters of
@@ -156,7 +156,9 @@ def identify_payload(
     weighted = data.weighted(joint_weights(data, estimate.values))
     sought = slice(len(estimate.values) - columns.shape[1], None)
     values = nearest_physical_load(weighted, estimate.values[sought], place.basis)
-    return Payload(place.basis @ values, place.basis @ spread.covariance[sought, sought] @ place.basis.T, spread.factor)
+    return IdentifiedLoad(
+        place.basis @ values, place.basis @ spread.covariance[sought, sought] @ place.basis.T, spread.factor
+    )
 
 
 def torque_gains(
@@ -203,7 +205,7 @@ LOAD_POSITION_FACTOR = 2.0  # columns then lose nothing to the torque, and loads
 
 
 @dataclass(frozen=True)
-class Number:
+class LoadNumber:
     """A number of a load with half of its 95 % interval."""
 
     name: str
@@ -277,15 +279,15 @@ def payload_lines(loaded: Path, without: Path, setting: PayloadSetting) -> Resul
     return load_document(setting.place.link or len(task.structure.arm), numbers)
 
 
-def _payload_numbers(payload: Payload, mass_alone: bool) -> Iterator[Number]:
+def _payload_numbers(payload: IdentifiedLoad, mass_alone: bool) -> Iterator[LoadNumber]:
     """Each number of a load."""
     rows = list(zip(PARAMETER_NAMES, payload.parameters, payload.half_widths, PARAMETER_UNITS, strict=True))
     if payload.is_there:
         rows += zip(CENTRE_NAMES, payload.centre, payload.centre_half_widths, ["m"] * 3, strict=True)
-    yield from (Number(*row) for row in rows[: 1 if mass_alone else None])
+    yield from (LoadNumber(*row) for row in rows[: 1 if mass_alone else None])
 
 
-def load_document(link: int, numbers: Sequence[Number]) -> Document:
+def load_document(link: int, numbers: Sequence[LoadNumber]) -> Document:
     """A load as a document: its link (from 1) and its numbers."""
     return {
         "link": link,
@@ -293,7 +295,7 @@ def load_document(link: int, numbers: Sequence[Number]) -> Document:
     }
 
 
-def number_line(number: Number) -> str:
+def number_line(number: LoadNumber) -> str:
     """A number with its interval in a line."""
     return _interval_line(number.name, number.value, number.half_width, number.unit)
 

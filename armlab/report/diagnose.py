@@ -6,7 +6,7 @@ from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.torque import diagnose as engine
 from armlab.recordings.recording import Recording
-from armlab.report.told.summary import summary_of
+from armlab.report.account.summary import summary_of
 
 
 def diagnose(

@@ -30,7 +30,7 @@ class NoInertiaError(DataError):
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class MovingArm:
     """What moves. inertial: (10 * joints,) of the links; rotors: (joints,), kg m2 (kg) on the joint side."""
 
     arm: Arm
@@ -71,7 +71,7 @@ class Body:
         return (matrices + np.swapaxes(matrices, -1, -2)) / 2, torque[0]
 
 
-def runge_kutta(body: Body, position: Array, velocity: Array, torque: Array, step: float) -> tuple[Array, Array]:
+def runge_kutta(body: MovingArm, position: Array, velocity: Array, torque: Array, step: float) -> tuple[Array, Array]:
     """Motion under given torques from given states, by the classical fourth-order method.
 
     position, velocity: (windows, joints) at the start. torque: (windows, samples, joints), taken as straight between
@@ -152,7 +152,7 @@ def _window_rows(observed: Observed) -> tuple[NDArray[np.intp], str]:
     return chosen[:, None] + np.arange(count), observed.names[segment.run]
 
 
-def _simulate_windows(body: Body, observed: Observed, residual: Array, rows: NDArray[np.intp]) -> Array:
+def _simulate_windows(body: MovingArm, observed: Observed, residual: Array, rows: NDArray[np.intp]) -> Array:
     """Positions (windows, samples, joints) of a body; what its model adds to the torque follows from its residual."""
     motion = observed.motion
     body.inertia(motion.position[rows[:, 0]])
@@ -164,18 +164,18 @@ def _simulate_windows(body: Body, observed: Observed, residual: Array, rows: NDA
     return position
 
 
-def _new_body(diagnosis: Diagnosis) -> Body:
+def _new_body(diagnosis: Diagnosis) -> MovingArm:
     """Links and rotors of the model found."""
     assert diagnosis.inertial is not None
     assert diagnosis.model is not None
-    return Body(diagnosis.simulation.arm, diagnosis.inertial, diagnosis.model.rotor_inertia)
+    return MovingArm(diagnosis.simulation.arm, diagnosis.inertial, diagnosis.model.rotor_inertia)
 
 
-def _old_body(diagnosis: Diagnosis) -> Body:
+def _old_body(diagnosis: Diagnosis) -> MovingArm:
     """Links and rotors of the simulation as given, or of the refitted rigid body where there is none."""
     simulation, observed = diagnosis.simulation, diagnosis.observed
     if simulation.kind != "refit" and simulation.inertial is not None:
-        return Body(simulation.arm, simulation.inertial, _given_rotors(diagnosis))
+        return MovingArm(simulation.arm, simulation.inertial, _given_rotors(diagnosis))
     assert observed is not None
     assert diagnosis.refit is not None
     base = base_parameters(simulation.arm)
@@ -183,7 +183,7 @@ def _old_body(diagnosis: Diagnosis) -> Body:
     inertial = np.zeros(10 * len(simulation.arm))
     predicted = (observed.torque - diagnosis.refit).ravel()
     inertial[base.columns] = np.linalg.lstsq(matrix, predicted, rcond=None)[0]
-    return Body(simulation.arm, inertial, np.zeros(len(simulation.arm)))
+    return MovingArm(simulation.arm, inertial, np.zeros(len(simulation.arm)))
 
 
 def _given_rotors(diagnosis: Diagnosis) -> Array:

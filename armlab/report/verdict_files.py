@@ -31,7 +31,7 @@ from armlab.diagnosis.formats import (
     kind_of_effect,
 )
 from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Located, Unexplained
-from armlab.diagnosis.torque.names.findings import ToldCause, finding_shares
+from armlab.diagnosis.torque.names.findings import StatedCause, finding_shares
 from armlab.diagnosis.torque.predict.found_model import model_found
 from armlab.effects.library import effect_named
 from armlab.effects.parameters import ParameterValue
@@ -40,8 +40,8 @@ from armlab.recordings.differentiate import Signals
 from armlab.recordings.reading.answer import Doubt, SetupFinding
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER, corrected_texts
 from armlab.recordings.recording import Recording
-from armlab.report.told.summary import summary_of
-from armlab.report.told.told import finding_errors, tell
+from armlab.report.account.account import account_of, finding_errors
+from armlab.report.account.summary import summary_of
 
 MODEL = "model.yaml"
 
@@ -86,21 +86,21 @@ def check_can_be_written(folder: Path) -> None:
 
 def make_verdict(diagnosis: Diagnosis) -> VerdictFile:
     """The content of `verdict.json`."""
-    told, shares = tell(diagnosis), finding_shares(diagnosis.parts, len(diagnosis.claims))
+    account, shares = account_of(diagnosis), finding_shares(diagnosis.parts, len(diagnosis.claims))
     setup = tuple(_setup_entry(each) for each in (diagnosis.setup.findings if diagnosis.setup else ()))
     return VerdictFile(
         schema=VERDICT_SCHEMA,
         status=diagnosis.status,
         summary=summary_of(diagnosis),
-        story=tuple(_story_entry(each, len(setup)) for each in told.causes),
+        story=tuple(_story_entry(each, len(setup)) for each in account.causes),
         located=tuple(_located_entry(each) for each in diagnosis.located),
         findings=(*setup, *(_finding_entry(*each) for each in zip(diagnosis.claims, shares, strict=True))),
         unexplained=tuple(_unexplained_entry(each) for each in diagnosis.unexplained),
         friction=tuple(
             FrictionEntry(joint=each.joint, speeds=each.speeds, torque=each.torque, ci95=each.interval)
-            for each in told.friction
+            for each in account.friction
         ),
-        left=tuple(LeftEntry(**asdict(each)) for each in told.left),
+        left=tuple(LeftEntry(**asdict(each)) for each in account.left),
         doubts=tuple(_doubt_entry(each) for each in (diagnosis.setup.doubts if diagnosis.setup else ())),
         fit=tuple(_fit_entry(each) for each in diagnosis.fit),
     )
@@ -115,7 +115,7 @@ def _located_entry(each: Located) -> LocatedEntry:
     return LocatedEntry(joint=each.joint, share=each.share, where=where)
 
 
-def _story_entry(each: ToldCause, setup: int) -> StoryEntry:
+def _story_entry(each: StatedCause, setup: int) -> StoryEntry:
     places = tuple(setup + place for place in each.findings)
     return StoryEntry(cause=each.cause, joints=each.joints, share_of_gap=each.share, findings=places)
 

@@ -40,7 +40,7 @@ from armlab.recordings.load import load_recording
 from armlab.recordings.plain_least_squares import compare_plain
 from armlab.recordings.public import fetch_recording
 from armlab.recordings.recording import Recording
-from armlab.report.changes.report import comparison_lines, comparison_sentences, make_comparison_file
+from armlab.report.changes.comparison_report import comparison_lines, comparison_sentences, make_comparison_file
 from problem.regressor import rigid_body_torque
 
 pytestmark = pytest.mark.usefixtures("each_diagnosed_once")

@@ -13,7 +13,7 @@ from refusals import refusal
 from told_recordings import ARM, frame, motion_at, recording_in
 
 from armlab.cli.main import main
-from armlab.diagnosis.next.confusability.card import (
+from armlab.diagnosis.next.confusability import (
     Card,
     CardEntry,
     PlannedMotion,
@@ -21,7 +21,7 @@ from armlab.diagnosis.next.confusability.card import (
     read_planned_motions,
 )
 from armlab.effects.library import library
-from armlab.report.confusability.report import card_content, card_csv, card_lines, card_markdown
+from armlab.report.confusability.confusability_report import card_content, card_csv, card_lines, card_markdown
 
 RECORDS = Path(__file__).parents[2] / "results" / "best_known.json"
 

@@ -15,7 +15,7 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.identification.identifier import Identifier
-from armlab.report.told.summary import summary_of
+from armlab.report.account.summary import summary_of
 from armlab.report.verdict_files import make_verdict, write_verdict
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque

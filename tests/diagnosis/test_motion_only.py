@@ -20,28 +20,28 @@ from armlab.diagnosis.motion.calm_windows import confirm_in_calm_windows, find_c
 from armlab.diagnosis.motion.choose import ChosenServo, GainOfNumber, choose_servo, learned_errors
 from armlab.diagnosis.motion.compare import compare_motion
 from armlab.diagnosis.motion.couple import coupled_windows
-from armlab.diagnosis.motion.diagnose import diagnose_motion, split_runs
+from armlab.diagnosis.motion.diagnose_motion import diagnose_motion, split_runs
 from armlab.diagnosis.motion.encoder_steps import is_made_by_encoder_steps
 from armlab.diagnosis.motion.estimate import ServoFit, fit_servo
 from armlab.diagnosis.motion.export import mjcf_text
 from armlab.diagnosis.motion.held_out import JointTrials, replay_named, replays_as_well
 from armlab.diagnosis.motion.hold import hold_commands
 from armlab.diagnosis.motion.joint_replay import joint_errors, replay_joint
+from armlab.diagnosis.motion.motion_result import MotionDiagnosis, ServoFinding
 from armlab.diagnosis.motion.replay import joint_rms, replay
-from armlab.diagnosis.motion.result import MotionDiagnosis, ServoFinding
 from armlab.diagnosis.motion.separate import confused_parameters
 from armlab.diagnosis.motion.servo import NEUTRAL, PARAMETERS, USUAL, Key, Servos, place
+from armlab.diagnosis.motion.servo_simulation import ServoSimulation, read_servo_simulation
 from armlab.diagnosis.motion.shared_number import COMMON_DELAY, TOOL_MASS, JointModel, estimate_shared, weigh
-from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, make_windows
 from armlab.identification.model_file import read_model
 from armlab.recordings.motion import load_motion_recording
 from armlab.recordings.recording import MotionRun
 from armlab.report.motion.compare_write import comparison_page, make_motion_comparison
-from armlab.report.motion.report import joint_table, motion_page
-from armlab.report.motion.verdict import make_motion_verdict, motion_texts
-from armlab.report.motion.words import error_phrase, motion_lines
+from armlab.report.motion.motion_page import joint_table, motion_page
+from armlab.report.motion.motion_verdict import make_motion_verdict, motion_texts
+from armlab.report.motion.motion_words import error_phrase, motion_lines
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 

@@ -11,13 +11,13 @@ from servo_arms import write_recording
 
 from armlab.cli.main import main
 from armlab.common.errors import InputError
-from armlab.diagnosis.motion.diagnose import diagnose_motion
+from armlab.diagnosis.motion.diagnose_motion import diagnose_motion
+from armlab.diagnosis.motion.motion_result import MotionDiagnosis
 from armlab.diagnosis.motion.replay import joint_rms
-from armlab.diagnosis.motion.result import MotionDiagnosis
 from armlab.diagnosis.motion.servo import place
 from armlab.diagnosis.motion.tuning import DEFAULT
 from armlab.proof.open.motion.peer import WINDOWS, PeerComparison, compare_with_sysid, import_sysid, servo_task
-from armlab.proof.open.motion.real import peer_section
+from armlab.proof.open.motion.public_servos import peer_section
 from armlab.recordings.motion import load_motion_recording
 
 TRUTH = {"kp": 8.0, "kv": 0.0, "damping": 0.5, "frictionloss": 0.1, "delay": 0.02}

@@ -9,7 +9,7 @@ import pytest
 from servo_arms import RATE_HZ, arm_text, write_recording
 
 from armlab.diagnosis.motion.servo import NEUTRAL, Key, place
-from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
+from armlab.diagnosis.motion.servo_simulation import ServoSimulation, read_servo_simulation
 from armlab.diagnosis.motion.witness import correlate_currents
 from armlab.recordings.motion import load_motion_recording
 from armlab.recordings.recording import MotionRun

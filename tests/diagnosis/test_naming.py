@@ -14,7 +14,7 @@ from armlab.diagnosis.torque.names.decide import calibrated_weights, named_claim
 from armlab.diagnosis.torque.names.findings import Statement, statement_of
 from armlab.effects.drive import TorqueOffset
 from armlab.effects.friction import CoulombFriction
-from armlab.proof.open.calibration.calibrate import Finding, calibrate, judge_reliability
+from armlab.proof.open.calibration.calibrate import ExampleFinding, calibrate, judge_reliability
 
 
 @pytest.fixture(autouse=True)
@@ -51,7 +51,7 @@ def test_weights_are_found_that_made_the_choices() -> None:
     found = fit_weights(examples, dict.fromkeys(true, 0.0), dict.fromkeys(true, 2.0))
     assert found["one"] == pytest.approx(2.0, abs=0.15)
     assert found["other"] == pytest.approx(-1.0, abs=0.15)
-    findings = [Finding(str(number % 50), "clean", each, False) for number, each in enumerate(examples)]
+    findings = [ExampleFinding(str(number % 50), "clean", each, False) for number, each in enumerate(examples)]
     calibration = calibrate(findings).tiers["clean"]
     assert all(low <= each.mean <= high for each in calibration.bins for low, high in [each.interval])
     assert calibration.brier[0] < calibration.brier[1]
@@ -226,8 +226,8 @@ def test_a_real_recording_is_judged_by_weights_that_do_not_know_it(recording: st
 
 def test_the_cases_of_a_real_recording_are_left_out_together() -> None:
     speaks, against = Example(({"a": 1.0}, {}), (True, False)), Example(({"a": 1.0}, {}), (False, True))
-    simulated = [Finding(str(number), "clean", speaks, False) for number in range(20)]
-    real = [Finding(str(number), "real", against, False, "emps") for number in range(20)]
+    simulated = [ExampleFinding(str(number), "clean", speaks, False) for number in range(20)]
+    real = [ExampleFinding(str(number), "real", against, False, "emps") for number in range(20)]
     found = calibrate([*simulated, *real])
     assert found.left_out["emps"].numbers["a"] > found.weights.numbers["a"]
     assert found.tiers["real"].bins[0].right == 0
@@ -235,7 +235,7 @@ def test_the_cases_of_a_real_recording_are_left_out_together() -> None:
 
 
 def test_findings_of_one_recording_cannot_be_left_out() -> None:
-    finding = Finding("1", "real", Example(({"a": 1.0}, {}), (True, False)), False, "emps")
+    finding = ExampleFinding("1", "real", Example(({"a": 1.0}, {}), (True, False)), False, "emps")
     with pytest.raises(InputError, match="give more"):
         calibrate([finding] * 3)
 

@@ -33,7 +33,7 @@ from armlab.effects.friction import CoulombFriction
 from armlab.effects.parameters import ParameterValue
 from armlab.effects.timing import TimeDelay
 from armlab.recordings.load import load_recording
-from armlab.report.told.told import tell
+from armlab.report.account.account import account_of
 from armlab.report.torque import write
 from armlab.report.torque.content import error_note, finding_details, left_table
 from armlab.report.torque.gallery import draw_gallery
@@ -197,7 +197,7 @@ def test_the_story_stands_beside_the_arm_on_a_wide_screen_and_above_it_on_a_phon
 def test_the_arm_drawing_names_every_finding_that_is_told(found: Diagnosis) -> None:
     picture = draw_gallery(found, select_residuals(found)).arm  # type: ignore[arg-type]
     said = " ".join(re.findall(r"<text[^>]*>([^<]*)</text>", str(picture)))
-    for each in tell(found).findings:
+    for each in account_of(found).findings:
         assert effect_in_words(each.claim.effect) in said
     assert " more" not in said
 

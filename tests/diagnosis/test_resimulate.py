@@ -11,7 +11,7 @@ from told_recordings import ARM, frame, recording_in
 
 from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.recordings.load import load_recording
-from armlab.report.resimulate import WINDOW_SECONDS, Body, NoInertiaError, resimulate, runge_kutta
+from armlab.report.resimulate import WINDOW_SECONDS, MovingArm, NoInertiaError, resimulate, runge_kutta
 from problem.arm import Arm, Joint, Link
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
@@ -27,16 +27,16 @@ def test_acceleration_under_the_inverse_dynamics_torque_is_the_acceleration(seed
     motion = Motion(*rng.uniform(-2, 2, (3, 5, len(arm))))
     rotors = rng.uniform(0, 1, len(arm))
     torque = rigid_body_torque(arm, motion) + rotors * motion.acceleration
-    body = Body(arm, arm.parameters, rotors)
+    body = MovingArm(arm, arm.parameters, rotors)
     assert_allclose(body.acceleration(motion.position, motion.velocity, torque), motion.acceleration, atol=1e-8)
 
 
-def pendulum() -> Body:
+def pendulum() -> MovingArm:
     """1 kg at 1 m on a horizontal axis, without its own inertia."""
     still = translation(0, 0, 0)
     arm = Arm("pendulum", (Joint("pivot", "revolute", still, still),), None, (0.0, -9.81, 0.0))
     link = Link(1.0, (1.0, 0.0, 0.0), (0.0, 1.0, 1.0, 0.0, 0.0, 0.0))
-    return Body(arm, link.parameters, np.zeros(1))
+    return MovingArm(arm, link.parameters, np.zeros(1))
 
 
 def swing(step: float) -> float:
@@ -56,14 +56,14 @@ def test_a_free_pendulum_keeps_its_energy_to_fourth_order_in_the_step() -> None:
 def test_a_point_mass_falls_by_half_g_t_squared() -> None:
     still = translation(0, 0, 0)
     arm = Arm("lift", (Joint("slide", "prismatic", still, still),))
-    body = Body(arm, Link(2.0, (0.0, 0.0, 0.0), (0.0,) * 6).parameters, np.zeros(1))
+    body = MovingArm(arm, Link(2.0, (0.0, 0.0, 0.0), (0.0,) * 6).parameters, np.zeros(1))
     position, _ = runge_kutta(body, np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, 11, 1)), 0.1)
     assert position[0, -1, 0] == pytest.approx(-9.81 / 2)
 
 
 def test_links_without_a_positive_inertia_are_refused() -> None:
     with pytest.raises(NoInertiaError, match="does not determine the mass"):
-        Body(ARM, -ARM.parameters, np.zeros(3)).inertia(np.zeros((1, 3)))
+        MovingArm(ARM, -ARM.parameters, np.zeros(3)).inertia(np.zeros((1, 3)))
 
 
 def test_the_found_model_follows_the_measured_motion_where_the_given_one_leaves_it(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from armlab.diagnosis.motion.robot_learning import isaac_lab_text, mjlab_text
 from armlab.diagnosis.motion.ros2_control import controllers_text, ros_urdf_text
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, KEYS, NEUTRAL, Servos
 from armlab.diagnosis.motion.servo_plugin import ServoPlugin, installed, read_servos
-from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
+from armlab.diagnosis.motion.servo_simulation import ServoSimulation, read_servo_simulation
 from armlab.diagnosis.motion.windows import smooth_motion
 from armlab.recordings.motion import MotionRecording, load_motion_recording
 from problem.robot_file import load_arm

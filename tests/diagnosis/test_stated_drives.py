@@ -8,7 +8,7 @@ import yaml
 from refusals import refusal
 
 from armlab.diagnosis.motion.servo import place
-from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
+from armlab.diagnosis.motion.servo_simulation import ServoSimulation, read_servo_simulation
 from armlab.recordings.check import check_recording
 from armlab.recordings.motion import load_motion_recording
 

@@ -10,8 +10,8 @@ from scipy.stats import spearmanr
 from simulated_arm import arm, run, structure, truth
 
 import armlab.proof.open.conditioning.arm as conditioning_arm
+import armlab.proof.open.conditioning.conditioning_study as study
 import armlab.proof.open.conditioning.correlation as correlation
-import armlab.proof.open.conditioning.study as study
 from armlab.common.arrays import Array
 from armlab.identification.identifier import Identifier
 from armlab.identification.regression import Regression
@@ -19,11 +19,11 @@ from armlab.identification.torque_model import TorqueModel
 from armlab.identification.validation import run_error
 from armlab.proof.open.conditioning.answer import MEAN, median_of_preferred, verdict
 from armlab.proof.open.conditioning.arm import ArmWindows, simulated_torques, study_arm
+from armlab.proof.open.conditioning.conditioning_page import CHOICES_NAME, PAGE_NAME, TABLE_NAME
 from armlab.proof.open.conditioning.correlation import BlockCorrelation, average, correlate
 from armlab.proof.open.conditioning.criteria import CRITERIA, prediction_criterion, window_criteria
-from armlab.proof.open.conditioning.page import CHOICES_NAME, PAGE_NAME, TABLE_NAME
-from armlab.proof.open.conditioning.windows import Windows, block_rows
-from armlab.proof.open.real_identification.study import Recipe
+from armlab.proof.open.conditioning.windows import RunWindows, block_rows
+from armlab.proof.open.real_identification.identify_recording import Recipe
 from armlab.recordings.recording import Recording, Transmission
 
 RECIPE = Recipe("emps", {})
@@ -49,7 +49,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_windows_are_all_choices_of_blocks_and_a_permutation_exchanges_them() -> None:
-    windows = Windows(2, blocks=3)
+    windows = RunWindows(2, blocks=3)
     assert windows.members.tolist() == [[0, 1], [0, 2], [1, 2]]
     assert windows.permuted(np.array([1, 2, 0])).tolist() == [2, 0, 1]
     assert windows.without(1).tolist() == [1]
@@ -82,7 +82,7 @@ def test_v_optimality_is_the_power_of_the_predicted_error_under_white_noise() ->
     assert prediction_criterion(triangle, judged) == pytest.approx(power, rel=0.03)
 
 
-def _block_sums(windows: Windows, rng: np.random.Generator) -> Array:
+def _block_sums(windows: RunWindows, rng: np.random.Generator) -> Array:
     """A quantity of each window to which every block adds its own part."""
     return np.exp(rng.normal(size=windows.blocks)[windows.members].sum(axis=1))
 
@@ -91,7 +91,7 @@ def test_unrelated_criteria_are_rarely_significant_though_windows_share_blocks(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(correlation, "PERMUTATIONS", 99)
-    windows, rejected, held, naive = Windows(4), 0, 0, 0
+    windows, rejected, held, naive = RunWindows(4), 0, 0, 0
     for seed in range(120):
         rng = np.random.default_rng(seed)
         criterion, error = _block_sums(windows, rng), _block_sums(windows, rng)
@@ -106,7 +106,7 @@ def test_unrelated_criteria_are_rarely_significant_though_windows_share_blocks(
 
 def test_a_criterion_that_sorts_windows_as_their_errors_has_correlation_one(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(correlation, "PERMUTATIONS", 99)
-    windows, rng = Windows(4), np.random.default_rng(0)
+    windows, rng = RunWindows(4), np.random.default_rng(0)
     error = _block_sums(windows, rng)
     found = correlate(windows, np.column_stack([error**3, -error, np.ones(len(error))]), error, rng)
     assert found.value[:2] == pytest.approx([1.0, -1.0])
@@ -120,11 +120,11 @@ def test_the_mean_over_arms_leaves_out_an_arm_without_a_value() -> None:
         each = np.array([value])
         return BlockCorrelation(each, 0 * each + 0.3, each, each, each, np.full((9, 1), 0.1 * value))
 
-    mean = average([correlations(0.4), correlations(0.8), correlations(np.nan)], Windows(4))
+    mean = average([correlations(0.4), correlations(0.8), correlations(np.nan)], RunWindows(4))
     assert mean.value == pytest.approx([0.6])
     assert mean.error == pytest.approx([0.3 / np.sqrt(2)])
     assert mean.p == pytest.approx([0.1])
-    assert np.isnan(average([correlations(np.nan)], Windows(4)).value[0])
+    assert np.isnan(average([correlations(np.nan)], RunWindows(4)).value[0])
 
 
 @pytest.mark.parametrize("samples", [60, 61])
@@ -156,7 +156,7 @@ def test_the_whole_run_has_the_error_that_plain_identification_has(recording: Re
 
 def test_the_preferred_windows_are_those_with_the_least_criterion() -> None:
     errors = np.arange(10.0)
-    length = ArmWindows(Windows(1, blocks=10), 1.0, pd.DataFrame(), errors, errors[:, None])
+    length = ArmWindows(RunWindows(1, blocks=10), 1.0, pd.DataFrame(), errors, errors[:, None])
     assert median_of_preferred(length, -errors) == 9.0
 
 
@@ -180,7 +180,7 @@ def test_the_study_writes_page_tables_and_picture_and_logs_its_look(
 ) -> None:
     monkeypatch.setattr(study, "open_public_recording", lambda name, folder: recording)
     lines = list(study.study_conditioning(tmp_path, tmp_path, ["emps"], lambda message: None))
-    assert lines[0].startswith("**Windows of 10 of 12 blocks: ")
+    assert lines[0].startswith("**RunWindows of 10 of 12 blocks: ")
     written = {path.name for path in tmp_path.iterdir()}
     assert written >= {PAGE_NAME, TABLE_NAME, CHOICES_NAME, "conditioning.png"}
     table = pd.read_csv(tmp_path / TABLE_NAME)

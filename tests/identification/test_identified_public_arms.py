@@ -8,8 +8,8 @@ from armlab.identification.components import usual_components, wrist_couplings
 from armlab.identification.model import Model
 from armlab.identification.structure import Structure
 from armlab.identification.validation import run_error
-from armlab.proof.open.real_identification.published import Comparison, sum_weights
-from armlab.proof.open.real_identification.study import RECIPES, recipe_named, study_recording
+from armlab.proof.open.real_identification.identify_recording import RECIPES, recipe_named, study_recording
+from armlab.proof.open.real_identification.published import PublishedComparison, sum_weights
 from armlab.recordings.public import PUBLIC_RECORDINGS, open_public_recording
 from problem.robot_file import load_arm
 
@@ -54,7 +54,7 @@ def test_a_sum_that_torques_do_not_tell_is_refused() -> None:
 
 
 def test_differences_are_told_in_combined_standard_errors() -> None:
-    assert Comparison("x", 1.0, 0.3, 2.0, 0.4).ratio == pytest.approx(2.0)
+    assert PublishedComparison("x", 1.0, 0.3, 2.0, 0.4).ratio == pytest.approx(2.0)
 
 
 def test_every_public_recording_has_a_recipe() -> None:

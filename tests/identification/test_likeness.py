@@ -11,10 +11,10 @@ import yaml
 from armlab.common.errors import DataError
 from armlab.proof.open.likeness.classifier import LikenessArm, area_under_curve, separate
 from armlab.proof.open.likeness.features import FEATURES, recording_features
-from armlab.proof.open.likeness.page import FIGURE_FILE, PAGE_FILE, likeness_texts
+from armlab.proof.open.likeness.likeness_page import FIGURE_FILE, PAGE_FILE, likeness_texts
+from armlab.proof.open.likeness.look import compare, look_of, looks_text, read_looks
 from armlab.proof.open.likeness.pictures import KEY_FILE, Pictured, draw_pictures
 from armlab.proof.open.likeness.real_arms import RealFolder, arm_of, drawable_folders
-from armlab.proof.open.likeness.study import compare, look_of, looks_text, read_looks
 
 ROBOT = {
     "name": "drive",

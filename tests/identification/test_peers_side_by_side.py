@@ -11,8 +11,8 @@ from simulated_arm import run, structure, truth
 from armlab.identification.regression import signals_of
 from armlab.proof.open.peers.exchange import PeerRun, read_runs, write_runs
 from armlab.proof.open.peers.side_by_side import PeerResult, compare_peers, write_peers
+from armlab.proof.open.real_identification.identify_recording import recipe_named, study_recording
 from armlab.proof.open.real_identification.looks import Looks
-from armlab.proof.open.real_identification.study import recipe_named, study_recording
 from armlab.recordings.public import open_public_recording
 
 

@@ -13,8 +13,8 @@ import yaml
 from armlab.common.errors import InputError
 from armlab.common.settings import validate
 from armlab.proof.open.real_folders.facts import FactsFile, PairFacts, SingleFacts, read_facts
-from armlab.proof.open.real_folders.score import FolderScore, score_missing, score_pair, score_single
-from armlab.proof.open.real_folders.told import FACT_RANKS, ToldVerdict
+from armlab.proof.open.real_folders.facts_score import FolderScore, score_missing, score_pair, score_single
+from armlab.proof.open.real_folders.stated_names import FACT_RANKS, ToldVerdict
 from armlab.recordings.public import LOCAL_COPIES_VARIABLE, local_copies
 
 GROUPS = {"friction": ["coulomb_friction", "viscous_friction", "friction_curve"], "links": ["payload"]}

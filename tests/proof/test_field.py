@@ -10,14 +10,14 @@ import pytest
 from armlab.common.settings import read_json, validate
 from armlab.proof.blind.effects.channels import Saturation
 from armlab.proof.blind.engine import inverse_dynamics
+from armlab.proof.blind.field.field_cases import make_field_case
+from armlab.proof.blind.field.field_hidden import FieldEffect
+from armlab.proof.blind.field.field_plan import FIELD, FieldPlan, draw_field_plan, new_side
+from armlab.proof.blind.field.field_runs import FieldCase, on_same_motion, simulate_field
+from armlab.proof.blind.field.field_score import judge_verdict, measure_field
+from armlab.proof.blind.field.field_sizes import strength
+from armlab.proof.blind.field.field_truth import FieldTruth, make_field_truth
 from armlab.proof.blind.field.files import log_field_run, write_field_observation
-from armlab.proof.blind.field.hidden import FieldEffect
-from armlab.proof.blind.field.make import make_field_case
-from armlab.proof.blind.field.plan import FIELD, FieldPlan, draw_field_plan, new_side
-from armlab.proof.blind.field.score import judge_verdict, measure_field
-from armlab.proof.blind.field.simulate import FieldCase, on_same_motion, simulate_field
-from armlab.proof.blind.field.sizing import strength
-from armlab.proof.blind.field.truth import FieldTruth, make_field_truth
 from armlab.recordings.load import load_recording
 
 SEED = 1000

@@ -17,7 +17,7 @@ from armlab.proof.blind.loop.counts import (
     mean_chances,
     reliability_bins,
 )
-from armlab.proof.blind.loop.page import Seals, render_page, write_page
+from armlab.proof.blind.loop.loop_page import Seals, render_page, write_page
 from armlab.proof.blind.loop.run import LoopSettings
 
 LATE = ("time_delay", None)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from armlab.common.errors import InputError
-from armlab.proof.blind.pairs.plan import CHANGE_KINDS, PAIRS, DriftingNoise, PairPlan, draw_change, draw_pair
-from armlab.proof.blind.pairs.score import PairOutcome, count_names, measures_of
+from armlab.proof.blind.pairs.pair_plan import CHANGE_KINDS, PAIRS, DriftingNoise, PairPlan, draw_change, draw_pair
+from armlab.proof.blind.pairs.pair_score import PairOutcome, count_names, measures_of
 from armlab.proof.tiers.changes import CHANGES, PairSet
 
 

@@ -17,7 +17,7 @@ from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.torque.rows.simulation import read_simulation
 from armlab.effects.parameters import ParameterValue
 from armlab.proof.open.real_arms import checks, leave_one_out
-from armlab.proof.open.real_arms.bench import bench_real_arms
+from armlab.proof.open.real_arms.all_arms import bench_real_arms
 from armlab.proof.open.real_arms.checks import level_check, mass_agreement
 from armlab.proof.open.real_arms.direct_reading import DirectLevel, direct_levels
 from armlab.proof.open.real_arms.judged_run import Percent, common_cutoff, judged_run
@@ -31,10 +31,10 @@ from armlab.proof.open.real_arms.leave_one_out import (
     leave_arms_out,
     single_changes,
 )
-from armlab.proof.open.real_arms.study import Line, Progress, given_model, study_arm
-from armlab.proof.open.real_identification import study as recipes
+from armlab.proof.open.real_arms.one_arm import ModelLine, Progress, given_model, study_arm
+from armlab.proof.open.real_identification import identify_recording as recipes
+from armlab.proof.open.real_identification.identify_recording import Recipe
 from armlab.proof.open.real_identification.looks import Looks
-from armlab.proof.open.real_identification.study import Recipe
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording, Run
 from problem.regressor import rigid_body_torque
@@ -58,7 +58,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def quick_recipes() -> Iterator[None]:
     """Recipes without counterbalance and payload, which the small arm does not have."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("armlab.proof.open.real_arms.bench.RECIPES", (QUICK, recipes.recipe_named("emps")))
+        patch.setattr("armlab.proof.open.real_arms.all_arms.RECIPES", (QUICK, recipes.recipe_named("emps")))
         yield
 
 
@@ -131,7 +131,7 @@ def test_all_models_of_a_run_are_judged_by_one_filter_as_recorded_and_filtered(r
 
 def test_named_share_is_what_names_close_of_what_the_whole_model_closes() -> None:
     errors = {"rigid_refitted": Percent(50, 40), "named": Percent(20, 10), "diagnose": Percent(10, 5)}
-    line = Line("a", "refit", "b", 10.0, errors, None, 2.0, 1.0, 0.2, 1)
+    line = ModelLine("a", "refit", "b", 10.0, errors, None, 2.0, 1.0, 0.2, 1)
     assert line.reading_ratio == pytest.approx(0.25)
     assert line.named_share("recorded") == pytest.approx(30 / 40)
     assert line.named_share("filtered") == pytest.approx(30 / 35)

@@ -13,19 +13,19 @@ from told_reference import reference_in
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.torque.rows.simulation import Simulation
+from armlab.proof.open.real_concealed.cases_of_recording import ConcealedStudy, study_cases, study_recording
 from armlab.proof.open.real_concealed.conceal import (
-    Reference,
+    ReferenceModel,
     add_disturbance,
     identify_reference,
     sought_of_pieces,
     withhold_pieces,
 )
 from armlab.proof.open.real_concealed.examine import open_outcomes
-from armlab.proof.open.real_concealed.plan import INJECTED, WITHHELD, Case, Disturbance, Piece, cases_of
+from armlab.proof.open.real_concealed.fixed_plan import INJECTED, WITHHELD, Case, Disturbance, Piece, cases_of
 from armlab.proof.open.real_concealed.report import conceal_in_recordings
-from armlab.proof.open.real_concealed.study import ConcealedStudy, study_cases, study_recording
+from armlab.proof.open.real_identification.identify_recording import RECIPES
 from armlab.proof.open.real_identification.looks import Looks
-from armlab.proof.open.real_identification.study import RECIPES
 from armlab.recordings.recording import Run
 from problem.regressor import rigid_body_torque
 
@@ -38,23 +38,23 @@ CASES = (
 
 
 @pytest.fixture(scope="module")
-def reference(tmp_path_factory: pytest.TempPathFactory) -> Reference:
+def reference(tmp_path_factory: pytest.TempPathFactory) -> ReferenceModel:
     return reference_in(tmp_path_factory.mktemp("recordings") / "told")
 
 
 @pytest.fixture(scope="module")
-def studied(reference: Reference, tmp_path_factory: pytest.TempPathFactory) -> tuple[ConcealedStudy, Path]:
+def studied(reference: ReferenceModel, tmp_path_factory: pytest.TempPathFactory) -> tuple[ConcealedStudy, Path]:
     folder = tmp_path_factory.mktemp("kept")
     looks = Looks(folder / "looks.jsonl")
     return study_cases(reference, CASES, open_outcomes(folder), looks, lambda message: None), folder
 
 
-def _run(reference: Reference) -> tuple[Run, Array]:
+def _run(reference: ReferenceModel) -> tuple[Run, Array]:
     run = reference.recording.runs[0]
     return run, np.arange(run.samples) / run.rate_hz
 
 
-def test_a_payload_adds_its_rigid_torque_and_leaves_the_noise_as_it_was(reference: Reference) -> None:
+def test_a_payload_adds_its_rigid_torque_and_leaves_the_noise_as_it_was(reference: ReferenceModel) -> None:
     run, time = _run(reference)
     ball = Disturbance("payload", 3, 2.0, "kg", centre=(0.05, 0.03, 0.1), radius=0.0)
     changed, added = add_disturbance(run, ARM, ball)
@@ -68,7 +68,7 @@ def test_a_payload_adds_its_rigid_torque_and_leaves_the_noise_as_it_was(referenc
     np.testing.assert_allclose(changed.torque - added, run.torque, atol=1e-12)
 
 
-def test_springs_and_wear_act_at_their_joint_alone(reference: Reference) -> None:
+def test_springs_and_wear_act_at_their_joint_alone(reference: ReferenceModel) -> None:
     run, time = _run(reference)
     motion = motion_at(time, 0)
     _, spring = add_disturbance(run, ARM, Disturbance("cable_stiffness", 2, 3.0, "N m/rad", rest=0.4))
@@ -79,7 +79,7 @@ def test_springs_and_wear_act_at_their_joint_alone(reference: Reference) -> None
     assert not wear[:, 1:].any()
 
 
-def test_a_late_torque_is_that_of_earlier_samples_and_starts_where_it_was_recorded(reference: Reference) -> None:
+def test_a_late_torque_is_that_of_earlier_samples_and_starts_where_it_was_recorded(reference: ReferenceModel) -> None:
     run, _ = _run(reference)
     late, added = add_disturbance(run, ARM, Disturbance("time_delay", None, 0.01, "s"))  # two samples of 5 ms
     assert late.samples == run.samples - 2
@@ -88,7 +88,7 @@ def test_a_late_torque_is_that_of_earlier_samples_and_starts_where_it_was_record
     np.testing.assert_allclose(added, run.torque[:-2] - run.torque[2:], atol=1e-9)
 
 
-def test_a_model_without_a_piece_lacks_its_torque_and_nothing_else(reference: Reference) -> None:
+def test_a_model_without_a_piece_lacks_its_torque_and_nothing_else(reference: ReferenceModel) -> None:
     pieces = (Piece("friction", 2),)
     model = reference.model
     motion = motion_at(np.arange(200) / 200, 1)
@@ -103,7 +103,7 @@ def test_a_model_without_a_piece_lacks_its_torque_and_nothing_else(reference: Re
     assert numbers["coulomb_friction"]["level"][0] == pytest.approx(COULOMB[1], abs=0.1)
 
 
-def test_a_model_without_its_payload_has_the_last_link_of_its_maker(reference: Reference) -> None:
+def test_a_model_without_its_payload_has_the_last_link_of_its_maker(reference: ReferenceModel) -> None:
     model = reference.model
     assert model.inertial is not None
     loaded = model.inertial.copy()
@@ -118,7 +118,7 @@ def test_a_model_without_its_payload_has_the_last_link_of_its_maker(reference: R
     assert sought.numbers["payload"]["mass"][0] == pytest.approx(1.5)
 
 
-def test_a_piece_that_the_reference_does_not_have_is_refused(reference: Reference) -> None:
+def test_a_piece_that_the_reference_does_not_have_is_refused(reference: ReferenceModel) -> None:
     with pytest.raises(ValueError, match="no counterbalance of joint 2"):
         withhold_pieces(reference.model, (Piece("counterbalance", 2),))
 
@@ -141,7 +141,7 @@ def test_what_is_concealed_is_named_with_its_size_and_the_control_names_nothing(
 
 
 def test_kept_outcomes_are_not_looked_at_again_and_every_look_is_logged(
-    studied: tuple[ConcealedStudy, Path], reference: Reference
+    studied: tuple[ConcealedStudy, Path], reference: ReferenceModel
 ) -> None:
     found, folder = studied
     log = folder / "looks.jsonl"
@@ -152,7 +152,7 @@ def test_kept_outcomes_are_not_looked_at_again_and_every_look_is_logged(
     assert again.verdicts == found.verdicts
 
 
-def test_outcomes_of_other_code_or_another_recording_are_not_taken(reference: Reference, tmp_path: Path) -> None:
+def test_outcomes_of_other_code_or_another_recording_are_not_taken(reference: ReferenceModel, tmp_path: Path) -> None:
     kept, recording = open_outcomes(tmp_path), reference.recording
     (run, *rest) = recording.runs
     other = replace(recording, runs=(replace(run, torque=run.torque + 1e-9), *rest))
@@ -207,7 +207,7 @@ def test_friction_that_is_withheld_from_the_emps_is_named(tmp_path: Path, monkey
     assert identify_reference(found.reference.recording, recipe).model.inertial is not None
 
 
-def test_a_simulation_knows_of_which_joints_it_has_no_friction(reference: Reference) -> None:
+def test_a_simulation_knows_of_which_joints_it_has_no_friction(reference: ReferenceModel) -> None:
     arm, less = reference.recording.arm, withhold_pieces(reference.model, (Piece("friction", 2),))
     assert Simulation("nominal", arm, None, reference.model).joints_without_friction == frozenset()
     assert Simulation("nominal", arm, None, less).joints_without_friction == {2}

@@ -14,8 +14,8 @@ from armlab.proof.open.real_concealed.examine import (
     ReportedFinding,
     RivalName,
 )
+from armlab.proof.open.real_concealed.fixed_plan import Case, Disturbance
 from armlab.proof.open.real_concealed.labels import LabelledFinding, label_weighed
-from armlab.proof.open.real_concealed.plan import Case, Disturbance
 
 SPRING = SoughtEffect("spring at joint 2", ("cable_stiffness",), (2,), {}, ("gravity_compensator",))
 CASE = DrawnCase(Case("told", (), Disturbance("cable_stiffness", 2, 2.0, "N m/rad")), 3.5)

@@ -7,7 +7,7 @@ from told_reference import reference_in
 
 from armlab.common.arrays import Array
 from armlab.proof.open.real_concealed.conceal import (
-    Reference,
+    ReferenceModel,
     add_disturbance,
     links_hold_rotor,
     sought_of_disturbance,
@@ -20,29 +20,29 @@ from armlab.proof.open.real_concealed.draw import (
     draw_cases,
     make_gauge,
 )
-from armlab.proof.open.real_concealed.plan import Case, Disturbance, Piece
+from armlab.proof.open.real_concealed.fixed_plan import Case, Disturbance, Piece
 
 SEED, CASES = 1001, 16
 
 
 @pytest.fixture(scope="module")
-def reference(tmp_path_factory: pytest.TempPathFactory) -> Reference:
+def reference(tmp_path_factory: pytest.TempPathFactory) -> ReferenceModel:
     return reference_in(tmp_path_factory.mktemp("recordings") / "emps")
 
 
 @pytest.fixture(scope="module")
-def drawn(reference: Reference) -> tuple[DrawnCase, ...]:
+def drawn(reference: ReferenceModel) -> tuple[DrawnCase, ...]:
     return draw_cases(reference, SEED, CASES)
 
 
-def _added(reference: Reference, what: Disturbance) -> tuple[Array, Array]:
+def _added(reference: ReferenceModel, what: Disturbance) -> tuple[Array, Array]:
     """What a disturbance adds, and the torque as recorded."""
     run = reference.recording.runs[0]
     return add_disturbance(run, ARM, what)[1], run.torque
 
 
 def test_cases_follow_from_the_seed_and_the_first_ones_from_no_other(
-    drawn: tuple[DrawnCase, ...], reference: Reference
+    drawn: tuple[DrawnCase, ...], reference: ReferenceModel
 ) -> None:
     assert draw_cases(reference, SEED, 5) == drawn[:5]
     assert draw_cases(reference, SEED + 1, 5) != drawn[:5]
@@ -54,7 +54,7 @@ def test_each_kind_comes_once_before_any_comes_twice(drawn: tuple[DrawnCase, ...
     assert sorted(first) == sorted([*INJECTED_KINDS, "friction"])
 
 
-def test_a_part_of_the_reference_is_withheld_once_at_most(reference: Reference) -> None:
+def test_a_part_of_the_reference_is_withheld_once_at_most(reference: ReferenceModel) -> None:
     pieces = [each.case.withheld for each in draw_cases(reference, SEED, 50) if each.case.withheld]
     assert len(pieces) == 3
     assert set(pieces) == {(Piece("friction", joint),) for joint in (1, 2, 3)}
@@ -68,7 +68,7 @@ def test_injected_strengths_are_those_that_are_aimed_at(drawn: tuple[DrawnCase, 
 
 
 def test_the_strength_of_an_offset_is_its_size_over_the_error_of_the_reference(
-    drawn: tuple[DrawnCase, ...], reference: Reference
+    drawn: tuple[DrawnCase, ...], reference: ReferenceModel
 ) -> None:
     (signals,) = (reference.model.signals(run) for run in reference.recording.with_role("identify"))
     error = np.sqrt(np.mean((signals.torque - reference.model.filtered_torque(signals)) ** 2, axis=0))
@@ -80,7 +80,7 @@ def test_the_strength_of_an_offset_is_its_size_over_the_error_of_the_reference(
 
 
 def test_strength_grows_in_proportion_to_a_size_and_is_that_of_the_joint_where_it_is_largest(
-    reference: Reference,
+    reference: ReferenceModel,
 ) -> None:
     gauge = make_gauge(reference)
     one, two = (
@@ -98,13 +98,13 @@ def test_a_delay_is_sought_and_is_never_longer_than_a_tenth_of_a_second() -> Non
     assert delay_of_strength(lambda delay: delay, 3.0) == pytest.approx(0.1)
 
 
-def test_a_late_channel_leaves_the_others_as_they_were(reference: Reference) -> None:
+def test_a_late_channel_leaves_the_others_as_they_were(reference: ReferenceModel) -> None:
     added, torque = _added(reference, Disturbance("channel_skew", 2, 0.01, "s"))  # two samples of 5 ms
     np.testing.assert_allclose(added[:, 1], torque[:-2, 1] - torque[2:, 1], atol=1e-9)
     assert not added[:, [0, 2]].any()
 
 
-def test_laws_at_one_joint_add_what_they_say(reference: Reference) -> None:
+def test_laws_at_one_joint_add_what_they_say(reference: ReferenceModel) -> None:
     run = reference.recording.runs[0]
     motion = motion_at(np.arange(run.samples) / run.rate_hz, 0)
     position, velocity, acceleration = motion.position[:, 1], motion.velocity[:, 1], motion.acceleration[:, 1]

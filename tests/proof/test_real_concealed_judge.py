@@ -2,8 +2,8 @@
 
 from armlab.proof.open.real_concealed.conceal import SoughtEffect
 from armlab.proof.open.real_concealed.examine import ExaminedCase, ParameterSize, ReportedFinding, RivalName
+from armlab.proof.open.real_concealed.fixed_plan import Case, Disturbance
 from armlab.proof.open.real_concealed.judge import Answer, CaseVerdict, judge_case
-from armlab.proof.open.real_concealed.plan import Case, Disturbance
 
 LOAD = SoughtEffect(
     "payload of 2 kg at link 3",

@@ -14,10 +14,10 @@ from armlab.cli.main import main
 from armlab.common.errors import InputError
 from armlab.proof.open.real_concealed import at_random
 from armlab.proof.open.real_concealed.at_random import RandomCases, conceal_at_random, judge_cases
-from armlab.proof.open.real_concealed.conceal import Reference
+from armlab.proof.open.real_concealed.conceal import ReferenceModel
 from armlab.proof.open.real_concealed.examine import conceal_case
+from armlab.proof.open.real_concealed.fixed_plan import Case, Disturbance, Piece
 from armlab.proof.open.real_concealed.observation import read_observation, write_observation
-from armlab.proof.open.real_concealed.plan import Case, Disturbance, Piece
 from armlab.proof.open.real_identification.looks import LOOKS_FILE
 
 CASES = (
@@ -28,13 +28,13 @@ CASES = (
 
 
 @pytest.fixture(scope="module")
-def reference(tmp_path_factory: pytest.TempPathFactory) -> Reference:
+def reference(tmp_path_factory: pytest.TempPathFactory) -> ReferenceModel:
     return reference_in(tmp_path_factory.mktemp("recordings") / "told")
 
 
 @pytest.mark.parametrize("case", CASES, ids=str)
 def test_an_observation_is_to_the_bit_what_a_diagnosis_gets_in_memory(
-    reference: Reference, case: Case, tmp_path: Path
+    reference: ReferenceModel, case: Case, tmp_path: Path
 ) -> None:
     wanted, _ = conceal_case(reference, case, tmp_path / "model.yaml")
     write_observation(reference, case, tmp_path / "seen")
@@ -55,7 +55,7 @@ def test_an_observation_is_to_the_bit_what_a_diagnosis_gets_in_memory(
 
 
 def test_an_observation_holds_neither_the_public_runs_nor_what_is_concealed(
-    reference: Reference, tmp_path: Path
+    reference: ReferenceModel, tmp_path: Path
 ) -> None:
     write_observation(reference, CASES[2], tmp_path / "seen")
     files = {path.name for path in (tmp_path / "seen").iterdir()}

@@ -14,9 +14,9 @@ from told_recordings import frame, recording_in
 from armlab.cli.main import main
 from armlab.common.errors import InputError
 from armlab.proof.open.real_folders import runs
-from armlab.proof.open.real_folders.bench import FolderBench, bench_folders
+from armlab.proof.open.real_folders.all_folders import FolderBench, bench_folders
 from armlab.proof.open.real_folders.errors import error_ratio, measure_errors
-from armlab.proof.open.real_folders.folders import find_folders
+from armlab.proof.open.real_folders.recording_folders import find_folders
 from armlab.recordings.public import LOCAL_COPIES_VARIABLE
 
 STAND_IN = """

@@ -10,8 +10,8 @@ from made_cases import write_made_cases
 
 from armlab.common.errors import InputError
 from armlab.proof.blind import sealed
-from armlab.proof.blind.real.page import render_page, write_score
-from armlab.proof.blind.real.score import RealTables, read_tables, real_measures, recording_table, reliability_of
+from armlab.proof.blind.real.real_page import render_page, write_score
+from armlab.proof.blind.real.real_score import RealTables, read_tables, real_measures, recording_table, reliability_of
 from armlab.proof.blind.sealed import TIME_FILE
 from armlab.proof.tiers import real as proving
 from armlab.proof.tiers.real import RealSet, prove_real

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from armlab.common.errors import InputError
-from armlab.proof.blind.real.weighed import read_weighed_real
+from armlab.proof.blind.real.real_names import read_weighed_real
 
 
 def _write(folder: Path, seed: int) -> Path:

@@ -26,8 +26,8 @@ from armlab.proof.blind.score.gallery import CASES_PER_GROUP, choose_items, tall
 from armlab.proof.blind.score.held_out import Gap, HeldOut, filter_held_out_run, measure_gap_closed, rms
 from armlab.proof.blind.score.measures import Measure, arm_table, compute_measures, confusion_table
 from armlab.proof.blind.score.outcomes import OUTCOME_GROUPS, list_misses, list_outcomes
-from armlab.proof.blind.score.page import SHOWN_MISS_COLUMNS, format_measure, judge_measure, render_page
 from armlab.proof.blind.score.rows import make_rows
+from armlab.proof.blind.score.score_page import SHOWN_MISS_COLUMNS, format_measure, judge_measure, render_page
 from armlab.proof.blind.score.scoring import ROW_TABLES, write_page_again
 from armlab.proof.blind.score.words import describe_hidden, describe_said
 from armlab.proof.blind.simulate import rigid_torque

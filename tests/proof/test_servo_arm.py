@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from armlab.proof.blind.plan import random_stream
-from armlab.proof.blind.servo.arms import draw_arm, write_mjcf
-from armlab.proof.blind.servo.engine import STEP_S, Body, Servo, ServoArm, mass_and_bias, simulate
-from armlab.proof.blind.servo.motions import draw_command
+from armlab.proof.blind.servo.servo_arms import draw_arm, write_mjcf
+from armlab.proof.blind.servo.servo_commands import draw_command
+from armlab.proof.blind.servo.servo_engine import STEP_S, Body, Servo, ServoArm, mass_and_bias, simulate
 
 RATE_HZ = 100.0
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
-from armlab.diagnosis.motion.diagnose import diagnose_motion
+from armlab.diagnosis.motion.diagnose_motion import diagnose_motion
 from armlab.proof.blind import sealed
-from armlab.proof.blind.servo.hidden import KINDS, Hidden
-from armlab.proof.blind.servo.make import MadeCase, make_case, write_case
-from armlab.proof.blind.servo.oracle import ServoOracle, find_size
-from armlab.proof.blind.servo.plan import MOTIONS, ServoCase, draw_cases
-from armlab.proof.blind.servo.score import judge
-from armlab.proof.blind.servo.truth import TRUTH_SCHEMA_FILE, truth_schema
+from armlab.proof.blind.servo.servo_cases import MadeCase, make_case, write_case
+from armlab.proof.blind.servo.servo_hidden import KINDS, Hidden
+from armlab.proof.blind.servo.servo_oracle import ServoOracle, find_size
+from armlab.proof.blind.servo.servo_plan import MOTIONS, ServoCase, draw_cases
+from armlab.proof.blind.servo.servo_score import judge
+from armlab.proof.blind.servo.servo_truth import TRUTH_SCHEMA_FILE, truth_schema
 from armlab.proof.tiers.motion import MOTION, MotionSet
 from armlab.recordings.motion import load_motion_recording
 
@@ -89,7 +89,8 @@ def test_a_written_case_is_a_recording_of_motion_and_its_answer_stays_outside(tm
 
 def test_the_shipped_schema_of_answers_is_that_of_the_model():
     shipped = json.loads(TRUTH_SCHEMA_FILE.read_text(encoding="utf-8"))
-    assert shipped == truth_schema(), f"write armlab.proof.blind.servo.truth.truth_schema() to {TRUTH_SCHEMA_FILE}"
+    where = "armlab.proof.blind.servo.servo_truth.truth_schema()"
+    assert shipped == truth_schema(), f"write {where} to {TRUTH_SCHEMA_FILE}"
 
 
 @pytest.mark.parametrize(("commit", "lines"), [(None, 0), ("a" * 40, 1)])

@@ -8,7 +8,7 @@ import pytest
 
 from armlab.proof.blind.score.stated import StatedClaim
 from armlab.proof.blind.setup.lapse import likeliest_odds_ratio
-from armlab.proof.blind.setup.score import SetupOutcome, score_setup
+from armlab.proof.blind.setup.setup_score import SetupOutcome, score_setup
 
 CASE = {"seed": 1001, "source": "real", "index": 0, "kind": "alone", "recording": "staubli-tx40", "physics": []}
 

@@ -11,7 +11,7 @@ from made_verdicts import verdict
 from armlab.common.errors import InputError
 from armlab.proof.blind.formats import Truth
 from armlab.proof.blind.score.cases import JudgedCase
-from armlab.proof.blind.score.weighed import check_development, label_findings
+from armlab.proof.blind.score.weighed_names import check_development, label_findings
 
 
 def weighed(answer: Truth, folder: Path, names: list[tuple[str, float]], kind: str = "found") -> JudgedCase:

@@ -20,7 +20,7 @@ from armlab.identification.torque_model import parameter_line
 from armlab.identification.validation import error_table, run_error
 from armlab.recordings.imports.files import import_files
 from armlab.recordings.load import load_recording
-from armlab.report.changes.report import compare_recordings
+from armlab.report.changes.comparison_report import compare_recordings
 
 ALONE = {"runs": SETTINGS["runs"][:1]}
 AS_READ = IdentifyOptions(as_read=True)

@@ -18,7 +18,7 @@ from armlab.recordings.reading import search
 from armlab.recordings.reading.answer import Answer, lapse, read_rightly
 from armlab.recordings.reading.corrected import correct_recording, corrected_texts
 from armlab.recordings.reading.fit import Fitter
-from armlab.recordings.reading.judge import Errors, Judge, View
+from armlab.recordings.reading.judge import Errors, ReadingJudge, View
 from armlab.recordings.reading.mistakes import (
     clock_error,
     contradicted_by,
@@ -202,7 +202,7 @@ def test_a_doubtful_gain_and_a_near_second_make_it_likely_that_no_name_is_right(
 
 def test_the_margin_is_that_of_the_next_best_mistake_of_another_name(tmp_path: Path) -> None:
     recording = recording_with(tmp_path / "rig", shift("q2", 90.0))
-    judge = Judge.of(recording, TUNING)
+    judge = ReadingJudge.of(recording, TUNING)
     assert judge is not None
     start = judge.trial(read_as_is(recording, ARM.parameters))
     found = search.find_mistakes(judge, start)
@@ -232,7 +232,7 @@ def test_each_mistake_has_its_rivals_where_the_last_step_leaves_one_out(
     steps = iter([lambda without, best: best, lambda without, best: without[0]])
     monkeypatch.setattr(search, "_better_in_place", lambda judge, without, lists, best: next(steps)(without, best))
     recording = recording_with(tmp_path / "rig", both(scale(["tau3"], -1.0), shift("q2", -90.0)))
-    judge = Judge.of(recording, replace(TUNING, max_mistakes=2))
+    judge = ReadingJudge.of(recording, replace(TUNING, max_mistakes=2))
     assert judge is not None
     found = search.find_mistakes(judge, judge.trial(read_as_is(recording, ARM.parameters)))
     assert len(found.best.reading.mistakes) == len(found.without) == len(found.rivals) == 1
@@ -353,7 +353,7 @@ def test_fitted_bodies_can_exist_and_friction_takes_energy(tmp_path: Path) -> No
 
 def test_what_frees_the_joints_of_their_links_is_no_unit(tmp_path: Path) -> None:
     recording = recording_with(tmp_path / "rig")
-    judge = Judge.of(recording, TUNING)
+    judge = ReadingJudge.of(recording, TUNING)
     assert judge is not None
     start = judge.trial(read_as_is(recording, ARM.parameters))
     assert not any(judge.is_accepted(start, each) for each in search_singles(judge, start))
@@ -363,7 +363,7 @@ def test_a_joint_that_travels_as_far_as_the_others_is_in_their_unit(tmp_path: Pa
     """An unknown load makes a joint that hardly moves explain more; only a joint that travels too far is in degrees."""
     for factor, wanted in ((1.0, set[str]()), (180 / np.pi, {"unit_error@1"})):
         recording = recording_with(tmp_path / f"{factor:.0f}", scale(["q1"], factor))
-        judge = Judge.of(recording, TUNING)
+        judge = ReadingJudge.of(recording, TUNING)
         assert judge is not None
         start = read_as_is(recording, ARM.parameters)
         degrees = [
@@ -400,7 +400,7 @@ def test_a_short_run_beside_a_long_one_hides_no_mistake(tmp_path: Path) -> None:
 def test_a_zero_near_half_a_turn_is_half_a_turn_where_the_data_do_not_tell(tmp_path: Path, angle: float) -> None:
     """No torque depends on the zero of a joint whose axis is vertical."""
     recording = recording_with(tmp_path / "rig")
-    judge = Judge.of(recording, TUNING)
+    judge = ReadingJudge.of(recording, TUNING)
     assert judge is not None
     start = read_as_is(recording, ARM.parameters)
     turned, refined = (judge.trial(encoder_offset(start, 0, np.deg2rad(each))) for each in (180.0, angle))

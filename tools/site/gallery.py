@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from armlab.common.arrays import Array
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.streams import named_generator
-from armlab.diagnosis.next.confusability.card import Card, PlannedMotion, confusability_card
+from armlab.diagnosis.next.confusability import Card, PlannedMotion, confusability_card
 from armlab.effects.contact import EXTERNAL_CONTACT_FACTS, Contact
 from armlab.effects.contract import Effect, Scene, Value
 from armlab.effects.example import random_motion

@@ -141,7 +141,7 @@ def compare_diagnosed(
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class ChangeLook:
     """A table of recordings and the changes that it shows."""
 
     pooled: Pooled
@@ -149,7 +149,7 @@ class Look:
     sound: SoundChanges
 
 
-def look_plainly(recordings: Sequence[Recording], simulation: Simulation, settings: Settings) -> Look | None:
+def look_plainly(recordings: Sequence[Recording], simulation: Simulation, settings: Settings) -> ChangeLook | None:
     """What rigid links and friction show; None where no run is long enough."""
     try:
         return _look(pool_plainly(recordings, simulation, settings), make_plain_table)
@@ -157,7 +157,7 @@ def look_plainly(recordings: Sequence[Recording], simulation: Simulation, settin
         return None
 
 
-def _look(pooled: Pooled, table_of: Callable[[Pooled], ChangeTable]) -> Look:
+def _look(pooled: Pooled, table_of: Callable[[Pooled], ChangeTable]) -> ChangeLook:
     """The changes, with columns that follow what is common beside them."""
     table = table_of(pooled)
     sound = find_sound_changes(pooled, table)
@@ -165,11 +165,11 @@ def _look(pooled: Pooled, table_of: Callable[[Pooled], ChangeTable]) -> Look:
         pooled = follow_levels(pooled, common_values(table, sound.named)[table.model])
         table = table_of(pooled)
         sound = find_sound_changes(pooled, table)
-    return Look(pooled, table, sound)
+    return ChangeLook(pooled, table, sound)
 
 
 def conclude(
-    seen: Look, diagnoses: Sequence[Diagnosis], notes: tuple[str, ...], dates: Sequence[date | None]
+    seen: ChangeLook, diagnoses: Sequence[Diagnosis], notes: tuple[str, ...], dates: Sequence[date | None]
 ) -> Comparison:
     """The changes with their names and numbers."""
     pooled, table, sound = seen.pooled, seen.table, seen.sound

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armlab.diagnosis.changes.between_runs import scatter_between_runs
+from armlab.diagnosis.changes.change_search import find_rivals, held_out_errors
 from armlab.diagnosis.changes.changes import ChangeGroup, ChangeTable, Tested
 from armlab.diagnosis.changes.friction_level import friction_changes
 from armlab.diagnosis.changes.numbers import (
@@ -17,7 +18,6 @@ from armlab.diagnosis.changes.numbers import (
     moved_laws,
 )
 from armlab.diagnosis.changes.pooled import Pooled, is_body
-from armlab.diagnosis.changes.search import find_rivals, held_out_errors
 from armlab.diagnosis.changes.soundness import held_out_gains
 from armlab.diagnosis.result import Rival
 from armlab.diagnosis.torque.columns.columns import place_of

@@ -7,10 +7,10 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.changes.between_runs import scatter_between_runs
+from armlab.diagnosis.changes.change_search import find_changes, held_out_errors
 from armlab.diagnosis.changes.changes import ChangeTable, Tested
 from armlab.diagnosis.changes.numbers import between_ends, half_width_factor, laws_of, recording_values
 from armlab.diagnosis.changes.pooled import Pooled, is_body
-from armlab.diagnosis.changes.search import find_changes, held_out_errors
 from armlab.diagnosis.torque.search.fitted_model import inertial_parameters
 from armlab.effects.contract import Scene
 from armlab.effects.drive import ROTOR_INERTIA

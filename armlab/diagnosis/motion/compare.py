@@ -16,7 +16,7 @@ from scipy.stats import t as student
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.motion.choose import ChosenServo, chance_of_gain, choose_servo
-from armlab.diagnosis.motion.diagnose import reason_unusable
+from armlab.diagnosis.motion.diagnose_motion import reason_unusable
 from armlab.diagnosis.motion.estimate import (
     LOGARITHMIC,
     coordinate_scales,
@@ -28,7 +28,7 @@ from armlab.diagnosis.motion.estimate import (
 )
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.servo import HIGHEST, LOWEST, PARAMETERS, ServoParameter, place
-from armlab.diagnosis.motion.simulation import read_servo_simulation
+from armlab.diagnosis.motion.servo_simulation import read_servo_simulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, make_windows
 from armlab.recordings.motion import MotionRecording

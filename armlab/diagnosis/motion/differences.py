@@ -10,9 +10,10 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.motion.arm_fit import ArmFit, number_of_tests
 from armlab.diagnosis.motion.choose import TESTS_OF_GAIN, ChosenServo, GainOfNumber
 from armlab.diagnosis.motion.held_out import command_error, rms_of, settled_errors
-from armlab.diagnosis.motion.result import ServoFinding
+from armlab.diagnosis.motion.motion_result import ServoFinding
 from armlab.diagnosis.motion.separate import TORQUE_SCALED, confused_parameters, has_weak_load
 from armlab.diagnosis.motion.servo import PARAMETERS, ServoParameter, place
+from armlab.diagnosis.motion.servo_simulation import ServoSimulation
 from armlab.diagnosis.motion.shared_number import (
     COMMON_DELAY,
     TOOL_MASS,
@@ -21,7 +22,6 @@ from armlab.diagnosis.motion.shared_number import (
     estimate_shared,
     with_more,
 )
-from armlab.diagnosis.motion.simulation import ServoSimulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 

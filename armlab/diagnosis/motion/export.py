@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, Key, Servos
 from armlab.diagnosis.motion.servo_plugin import NUMBERS
-from armlab.diagnosis.motion.simulation import ServoSimulation
+from armlab.diagnosis.motion.servo_simulation import ServoSimulation
 from armlab.identification.mjcf_edit import Drive, Meant, edit_mjcf, edit_mjcf_file, stated_fields
 from problem.mjcf import body_inertia, compile_mjcf, compile_mjcf_text
 from problem.mjcf_document import moved_mjcf

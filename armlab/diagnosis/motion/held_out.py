@@ -10,14 +10,14 @@ from armlab.common.errors import InputError
 from armlab.diagnosis.motion.choose import ChosenServo
 from armlab.diagnosis.motion.estimate import settle
 from armlab.diagnosis.motion.joint_replay import joint_errors
+from armlab.diagnosis.motion.motion_result import MotionDiagnosis, ReplayError, ServoFinding
 from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay
-from armlab.diagnosis.motion.result import JointError, MotionDiagnosis, ServoFinding
 from armlab.diagnosis.motion.servo import Servos
+from armlab.diagnosis.motion.servo_simulation import ServoSimulation
 from armlab.diagnosis.motion.shared_number import (
     TOOL_MASS,
     with_more,
 )
-from armlab.diagnosis.motion.simulation import ServoSimulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, smallest_step, window_stretches
 from armlab.recordings.recording import MotionRun
@@ -194,14 +194,14 @@ def errors_of_joint(
     before: Sequence[Replayed],
     after: Sequence[Replayed],
     held_out: Sequence[MotionRun],
-) -> JointError:
+) -> ReplayError:
     given, simulation = simulations
     nominal = given.nominal.values[number]
     known = bool(np.isfinite(nominal).all())
     commands = np.concatenate(
         [np.asarray(run.reference_position)[:, number] - run.position[:, number] for run in held_out]
     )
-    return JointError(
+    return ReplayError(
         joint=given.number_of(number),
         before=rms_of(settled_errors(judged, with_more(nominal, TOOL_MASS.place, -simulation.payload)))
         if known

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from armlab.diagnosis.motion.result import ServoFinding
+from armlab.diagnosis.motion.motion_result import ServoFinding
 from armlab.diagnosis.result import Weighed, WeighedName
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.names.decide import Naming, naming_of

@@ -9,7 +9,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.servo import Key, Servos
 from armlab.diagnosis.motion.servo_plugin import STICKING, set_fields
-from armlab.diagnosis.motion.simulation import ServoSimulation, actuator_of
+from armlab.diagnosis.motion.servo_simulation import ServoSimulation, actuator_of
 from armlab.diagnosis.motion.windows import held_command, smooth_motion, supply_factor
 from armlab.recordings.recording import MotionRun
 from problem.mjcf import import_mujoco

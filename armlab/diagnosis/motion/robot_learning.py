@@ -14,7 +14,7 @@ from collections.abc import Iterable, Sequence
 
 from armlab.diagnosis.motion.export import delay_steps, lines_without_field
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, Servos
-from armlab.diagnosis.motion.simulation import ServoSimulation
+from armlab.diagnosis.motion.servo_simulation import ServoSimulation
 
 UNITS = (
     "Units: stiffness N m/rad, damping N m s/rad, effort_limit and friction N m, armature kg m2 (N/m, N s/m, N, kg",

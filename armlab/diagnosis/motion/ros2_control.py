@@ -21,7 +21,7 @@ import yaml
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.export import lines_without_field
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, Key, Servos
-from armlab.diagnosis.motion.simulation import ServoSimulation
+from armlab.diagnosis.motion.servo_simulation import ServoSimulation
 from armlab.identification.export import build_simulator_model, unstated_limits, urdf_document
 from armlab.identification.structure import Structure
 from armlab.identification.torque_model import TorqueModel

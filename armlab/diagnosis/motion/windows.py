@@ -18,7 +18,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.servo import place
-from armlab.diagnosis.motion.simulation import ServoSimulation
+from armlab.diagnosis.motion.servo_simulation import ServoSimulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.recordings.recording import MotionRun
 from problem.arm import Arm

@@ -19,7 +19,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.estimate import with_damping_inside
 from armlab.diagnosis.motion.servo import place
-from armlab.diagnosis.motion.simulation import ServoSimulation
+from armlab.diagnosis.motion.servo_simulation import ServoSimulation
 from armlab.diagnosis.motion.windows import even_time, held_command, smooth_motion, supply_factor
 from armlab.recordings.recording import MotionRun
 

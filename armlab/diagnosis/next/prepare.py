@@ -13,9 +13,9 @@ from armlab.common.errors import InputError
 from armlab.diagnosis.next.first_run import FirstRun, FoundEffect, PresentModel, observe_first_run
 from armlab.diagnosis.next.moments import DesignMoments, Index, empty_moments
 from armlab.diagnosis.next.question import (
-    Layout,
     Name,
     Question,
+    RivalColumns,
     build_layout,
     inseparable_rivals,
 )
@@ -33,7 +33,7 @@ from armlab.diagnosis.next.rivals import (
     usual_friction,
 )
 from armlab.diagnosis.next.sampling import SAMPLES_PER_ROW, Sampling, white_noise_sampling
-from armlab.diagnosis.next.verdict_file import Finding, RivalGroup, VerdictWithModel
+from armlab.diagnosis.next.verdict_file import RivalGroup, VerdictFinding, VerdictWithModel
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.columns.links import link_prior
 from armlab.effects.contract import UNKNOWN, Candidate, Scene
@@ -58,7 +58,7 @@ class PreparedQuestions:
     """
 
     present: PresentModel
-    layout: Layout
+    layout: RivalColumns
     questions: tuple[Question, ...]
     sampling: Sampling
     seen: DesignMoments
@@ -131,7 +131,7 @@ class _Preparation:
     present: PresentModel
     parts: dict[Name, FoundEffect]
     laws: dict[Name, list[Candidate]]
-    layout: Layout
+    layout: RivalColumns
     links: LinkKnowledge
     first: FirstRun | None
     rich: list[Scene]
@@ -288,7 +288,7 @@ def _search_lead(near: tuple[Name, float]) -> float:
     return near[1]
 
 
-def _candidate_names(finding: Finding, verdict: VerdictWithModel, arm: Arm) -> list[Name]:
+def _candidate_names(finding: VerdictFinding, verdict: VerdictWithModel, arm: Arm) -> list[Name]:
     """Everything of the library at the finding's joint, at its link, and of the whole robot."""
     joint = finding.name.joint
     joints: Sequence[int] = range(1, len(arm) + 1) if joint is None else (joint,)

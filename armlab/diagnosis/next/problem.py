@@ -18,7 +18,7 @@ from armlab.diagnosis.next.moments import DesignMoments
 from armlab.diagnosis.next.motion import Budget, build_excitation_problem
 from armlab.diagnosis.next.prepare import LinkKnowledge, PreparedQuestions, prepare_questions
 from armlab.diagnosis.next.question import Name
-from armlab.diagnosis.next.verdict_file import Finding, VerdictWithModel
+from armlab.diagnosis.next.verdict_file import VerdictFinding, VerdictWithModel
 from armlab.effects.library import effect_named
 from problem.arm import Arm
 from problem.excitation import ExcitationProblem, ShiftedProblem, shift_randomly
@@ -158,6 +158,6 @@ class TellApartSettings(Settings):
         """The verdict that a diagnosis would give if the first rival were right."""
         first, *others = (Name(each.effect, each.joint) for each in self.rivals)
         parameters = dict(self.rivals[0].parameters)
-        finding = Finding(first, () if first.joint is None else (first.joint,), parameters, tuple(others))
+        finding = VerdictFinding(first, () if first.joint is None else (first.joint,), parameters, tuple(others))
         noise = np.array(per_joint_values("noise", self.noise, arm))
         return VerdictWithModel(Path("tell-apart"), (finding,), noise, self.cutoff_hz)

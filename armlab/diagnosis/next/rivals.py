@@ -19,7 +19,7 @@ from armlab.diagnosis.next.moments import (
     unexplained_power,
 )
 from armlab.diagnosis.next.question import Law, Name, RivalLaw, is_in_free_links
-from armlab.diagnosis.next.verdict_file import Finding
+from armlab.diagnosis.next.verdict_file import VerdictFinding
 from armlab.effects.contract import Candidate, Family, Scene
 from armlab.effects.library import library
 from problem.arm import Arm
@@ -39,7 +39,7 @@ def usual_friction(arm: Arm, scenes: Sequence[Scene]) -> list[Candidate]:
     return [shapes[0] for family in families for shapes in family.candidates(arm, scenes)]
 
 
-def restore_part(finding: Finding, arm: Arm, families: Sequence[Family]) -> FoundEffect | None:
+def restore_part(finding: VerdictFinding, arm: Arm, families: Sequence[Family]) -> FoundEffect | None:
     """A finding as a candidate with its coefficients; None where its parameters do not determine it."""
     place = finding.joints or (() if finding.name.joint is None else (finding.name.joint,))
     for family in families:

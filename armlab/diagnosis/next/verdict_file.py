@@ -20,7 +20,7 @@ from problem.base_parameters import base_parameters
 
 
 @dataclass(frozen=True, eq=False)
-class Finding:
+class VerdictFinding:
     """One finding. parameters: by name, SI units."""
 
     name: Name
@@ -38,7 +38,7 @@ class VerdictWithModel:
     """
 
     path: Path
-    findings: tuple[Finding, ...]
+    findings: tuple[VerdictFinding, ...]
     noise: Array
     cutoff_hz: float | None = None
     links: Array | None = None
@@ -82,10 +82,10 @@ def read_verdict(path: Path) -> VerdictWithModel:
     return VerdictWithModel(file, findings, noise, cutoff_hz, links, base_values)
 
 
-def _read_finding(entry: FindingEntry) -> Finding:
+def _read_finding(entry: FindingEntry) -> VerdictFinding:
     parameters = {name: each.value for name, each in entry.parameters.items()}
     rivals = tuple(Name(each.effect, each.joint) for each in entry.rivals)
-    return Finding(Name(entry.effect, entry.joint), entry.joints, parameters, rivals)
+    return VerdictFinding(Name(entry.effect, entry.joint), entry.joints, parameters, rivals)
 
 
 RivalGroup = tuple[Name, ...]
@@ -108,7 +108,7 @@ def select_rival_groups(verdict: VerdictWithModel, named: str | None) -> tuple[R
     return tuple(reversed(unique.values()))
 
 
-def _names_of_finding(finding: Finding) -> RivalGroup:
+def _names_of_finding(finding: VerdictFinding) -> RivalGroup:
     return tuple(dict.fromkeys((finding.name, *finding.rivals)))
 
 

@@ -39,7 +39,7 @@ from armlab.effects.term import format_number
 from armlab.effects.words import at_place
 from armlab.identification.payload import (
     CENTRE_NAMES,
-    Number,
+    LoadNumber,
     PayloadSetting,
     load_document,
     number_line,
@@ -92,7 +92,7 @@ class FoundLoad:
     """Numbers of a load that the motions determine, the names of those that they do not, and what stands beside it."""
 
     link: int
-    numbers: tuple[Number, ...]
+    numbers: tuple[LoadNumber, ...]
     undetermined: tuple[str, ...]
     beside: tuple[str, ...]
 
@@ -157,7 +157,7 @@ def find_load(recording: Recording, setting: PayloadSetting, settings: Settings,
     return FoundLoad(link, tuple(held[each] for each in determined), undetermined, beside)
 
 
-def _says_where(number: Number, mass: float) -> bool:
+def _says_where(number: LoadNumber, mass: float) -> bool:
     """Whether an interval is narrower than loads of this mass differ."""
     weight = mass if number.unit.startswith("kg") else 1.0
     return number.half_width <= weight * MAX_CENTRE_M ** METRES[number.unit]
@@ -189,7 +189,7 @@ def _with_candidate(model: FittedModel, candidate: Candidate) -> tuple[FittedMod
     return FittedModel(design, model.noise, moments, solver, model.state.plus(number), model.steps), number
 
 
-def _numbers(model: FittedModel, group: int) -> dict[str, Number]:
+def _numbers(model: FittedModel, group: int) -> dict[str, LoadNumber]:
     """The numbers of a body that a model adds, by name: those that stand for themselves, and its centre."""
     wide, candidate = extend_with_shapes(model), model.candidate(group)
     values, covariance = model.solver.values(model.fit, group), wide.covariance(group)
@@ -202,7 +202,7 @@ def _numbers(model: FittedModel, group: int) -> dict[str, Number]:
         centre = ten[1:4] / ten[0]
         spread = half_widths((slopes[1:4] - np.outer(centre, slopes[0])) / ten[0], covariance, wide.factor)
         numbers += zip(CENTRE_NAMES, centre.tolist(), spread.tolist(), ["m"] * 3, strict=True)
-    return {row[0]: Number(*row) for row in numbers}
+    return {row[0]: LoadNumber(*row) for row in numbers}
 
 
 def _ten(candidate: Candidate, values: Array) -> Array:

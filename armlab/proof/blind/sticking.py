@@ -16,7 +16,7 @@ from armlab.common.arrays import Array
 from armlab.proof.blind.effects.friction import Coulomb, Stribeck, Viscous
 from armlab.proof.blind.effects.hidden import HiddenEffect
 from armlab.proof.blind.engine import Track
-from armlab.proof.blind.servo.engine import Body, Servo, ServoArm, follow
+from armlab.proof.blind.servo.servo_engine import Body, Servo, ServoArm, follow
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.pseudo_inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia

@@ -43,7 +43,7 @@ MOTION_RATE_HZ = 250.0
 
 
 @dataclass(frozen=True, eq=False)
-class SecondMotion:
+class FollowUpMotion:
     """motion: (samples, 1 + joints), s and rad. expected: for each question its names and the chances."""
 
     motion: Array
@@ -71,7 +71,7 @@ def suspect_rivals(verdict: Path, robot: Path, recording: Path) -> tuple[RivalGr
 
 def design_second_motion(
     kind: MotionKind, verdict: Path, robot: Path, recording: Path, budget: Budget
-) -> SecondMotion | None:
+) -> FollowUpMotion | None:
     """A motion of that kind, and what it is expected to decide; None where no motion can be designed.
 
     All kinds share limits, duration, harmonics and number of evaluations.
@@ -87,7 +87,7 @@ def design_second_motion(
         return None
     else:
         point = search_motion(problem, budget)
-    return SecondMotion(
+    return FollowUpMotion(
         _sample_motion(excitation, point), () if problem is None else _expected_decisions(problem, point, budget)
     )
 

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from armlab.proof.blind.pairs.make import SIDES, make_pair, write_pair
-from armlab.proof.blind.pairs.plan import PairPlan, draw_pair
-from armlab.proof.blind.pairs.score import score_lines, score_pairs
+from armlab.proof.blind.pairs.pair_cases import SIDES, make_pair, write_pair
+from armlab.proof.blind.pairs.pair_plan import PairPlan, draw_pair
+from armlab.proof.blind.pairs.pair_score import score_lines, score_pairs
 from armlab.proof.blind.plan import DEVELOPMENT_SEEDS
 from armlab.proof.blind.sealed import OBSERVATION, TRUTH_FILE, Score, SealedTier
 from armlab.proof.tiers.torque import TIERS

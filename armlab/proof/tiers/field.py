@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from armlab.proof.blind.field.make import SIDES, make_field_case
-from armlab.proof.blind.field.plan import FieldKind, FieldPlan, draw_field_plan
-from armlab.proof.blind.field.score import score_field
+from armlab.proof.blind.field.field_cases import SIDES, make_field_case
+from armlab.proof.blind.field.field_plan import FieldKind, FieldPlan, draw_field_plan
+from armlab.proof.blind.field.field_score import score_field
 from armlab.proof.blind.sealed import OBSERVATION, TRUTH, TRUTH_FILE, VERDICTS, Score, SealedTier
 
 

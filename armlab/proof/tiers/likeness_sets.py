@@ -4,9 +4,9 @@ from pathlib import Path
 
 from joblib import Parallel, delayed
 
+from armlab.proof.blind.field.field_plan import FieldPlan, draw_field_plan
+from armlab.proof.blind.field.field_runs import simulate_field
 from armlab.proof.blind.field.files import write_field_observation
-from armlab.proof.blind.field.plan import FieldPlan, draw_field_plan
-from armlab.proof.blind.field.simulate import simulate_field
 from armlab.proof.blind.sealed import OBSERVATIONS
 from armlab.proof.tiers.torque import TORQUE, SetSettings
 

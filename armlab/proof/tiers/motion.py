@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from armlab.proof.blind.sealed import OBSERVATION, TRUTH_FILE, Score, SealedTier
-from armlab.proof.blind.servo.make import make_case, write_case
-from armlab.proof.blind.servo.plan import ServoCase, draw_cases
-from armlab.proof.blind.servo.score import score_motion
+from armlab.proof.blind.servo.servo_cases import make_case, write_case
+from armlab.proof.blind.servo.servo_plan import ServoCase, draw_cases
+from armlab.proof.blind.servo.servo_score import score_motion
 
 
 @dataclass(frozen=True)

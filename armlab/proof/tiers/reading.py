@@ -11,9 +11,9 @@ from armlab.common.errors import DataError, InputError
 from armlab.proof.blind.case_files import write_observation
 from armlab.proof.blind.sealed import OBSERVATION, TRUTH_FILE, Score, SealedTier
 from armlab.proof.blind.setup.mistakes import Injected, inject
-from armlab.proof.blind.setup.oracle import can_be_seen
-from armlab.proof.blind.setup.plan import PUBLIC, SetupCase, draw_cases, draw_mistakes, local_folder
-from armlab.proof.blind.setup.score import score_setup
+from armlab.proof.blind.setup.setup_oracle import can_be_seen
+from armlab.proof.blind.setup.setup_plan import PUBLIC, SetupCase, draw_cases, draw_mistakes, local_folder
+from armlab.proof.blind.setup.setup_score import score_setup
 from armlab.proof.blind.simulate import arm_with_effects
 from armlab.proof.blind.sizing import simulate_case
 from armlab.recordings.load import load_recording

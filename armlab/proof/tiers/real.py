@@ -14,8 +14,8 @@ from tempfile import TemporaryFile
 from armlab.common.errors import InputError
 from armlab.proof.blind.folders import claim_folder
 from armlab.proof.blind.plan import random_stream
-from armlab.proof.blind.real.page import write_score
-from armlab.proof.blind.real.score import TIER, read_tables, real_measures
+from armlab.proof.blind.real.real_page import write_score
+from armlab.proof.blind.real.real_score import TIER, read_tables, real_measures
 from armlab.proof.blind.sealed import (
     DRAFTS,
     OBSERVATION,

@@ -14,13 +14,13 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.proof.blind.log_page import LOG_FILE, LOG_PAGE
-from armlab.proof.blind.real.score import CASES_TABLE, read_tables, real_measures
+from armlab.proof.blind.real.real_score import CASES_TABLE, read_tables, real_measures
 from armlab.proof.blind.score.distance import SHARES, Distance, read_oracle_table
 from armlab.proof.blind.score.measures import MEASURE_TEXTS, MIN_NAMED_MULTIPLE, Measure
-from armlab.proof.blind.score.page import engines_section, format_aims, format_measure
+from armlab.proof.blind.score.score_page import engines_section, format_aims, format_measure
 from armlab.proof.blind.score.scoring import SCORE_FILE, read_rows
-from armlab.proof.blind.servo.score import MOTION_FILE, read_motion_measures
-from armlab.proof.blind.setup.score import SETUP_FILE, read_setup_measures
+from armlab.proof.blind.servo.servo_score import MOTION_FILE, read_motion_measures
+from armlab.proof.blind.setup.setup_score import SETUP_FILE, read_setup_measures
 
 SUMMARY_PAGE = "summary.md"
 _SETS = {"clean": "mixed", "realistic": "mixed", "reading simulated": "setup", "reading real": "setup"}

@@ -13,7 +13,7 @@ from typing import Literal, get_args
 
 from armlab.proof.blind.log_page import LOG_FILE
 from armlab.proof.blind.sealed import FINISHED_MARK, judged_seed
-from armlab.proof.blind.setup.plan import PUBLIC
+from armlab.proof.blind.setup.setup_plan import PUBLIC
 from armlab.proof.tiers.motion import MOTION, MotionSet
 from armlab.proof.tiers.reading import SETUP, SetupSet
 from armlab.proof.tiers.real import RealSet, prove_real

@@ -6,7 +6,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.recordings.reading.corrected import correct_recording
-from armlab.recordings.reading.judge import Judge
+from armlab.recordings.reading.judge import ReadingJudge
 from armlab.recordings.reading.reading import SPRING, Mistake, Reading, read_as_is
 from armlab.recordings.reading.search import Found, find_mistakes
 from armlab.recordings.reading.signs import has_no_sign
@@ -19,7 +19,7 @@ from problem.pseudo_inertia import are_bodies
 
 
 @dataclass(frozen=True)
-class Rival:
+class RivalReading:
     """What fits these data alike in the place of a mistake: another one, a spring of a joint, or links that are off."""
 
     effect: str
@@ -47,7 +47,7 @@ class SetupFinding:
     share_after: float
     sigmas: float
     probability: float
-    rivals: tuple[Rival, ...]
+    rivals: tuple[RivalReading, ...]
     next_experiment: str | None
 
     @property
@@ -136,7 +136,7 @@ def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTu
     if has_no_sign(recording):
         return Answer((_unsigned(recording),), recording, None)
     inertial = inertial if inertial is not None and are_bodies(inertial) else None
-    judge = Judge.of(recording, tuning)
+    judge = ReadingJudge.of(recording, tuning)
     if judge is None:
         return Answer((), recording, None)
     start = judge.trial(read_as_is(recording, inertial))
@@ -174,7 +174,7 @@ LEAST_TOLD = 0.5  # probability below which nothing is stated (the contract of v
 SMALLEST_SHARE = 1e-9  # of a joint that stands still
 
 
-def _finding(judge: Judge, found: Found, place: int) -> SetupFinding:
+def _finding(judge: ReadingJudge, found: Found, place: int) -> SetupFinding:
     """The mistake at a place, judged against the reading that leaves it in."""
     without, best = found.without[place], found.best
     mistake, reading = best.reading.mistakes[place], best.reading
@@ -195,13 +195,13 @@ def _finding(judge: Judge, found: Found, place: int) -> SetupFinding:
     chances = np.append(chances, chances.max() * judge.tuning.other_links_chance if by_links else 0.0)
     chances = chances / chances.sum() * (1 - lapse(sigmas, found.margins[place], judge.tuning))
     listed = [
-        Rival(each.effect, each.joint, each.joints, describe(each, arm), float(chance))
+        RivalReading(each.effect, each.joint, each.joints, describe(each, arm), float(chance))
         for (each, _), chance in zip(rivals, chances[1:-1], strict=True)
     ]
     if by_links:
         link = len(arm) if mistake.joint is None else mistake.joint
         words = f"{links_in_words(arm, [link])} is not as simulated"
-        listed.append(Rival(INERTIAL_ERROR, link, (), words, float(chances[-1])))
+        listed.append(RivalReading(INERTIAL_ERROR, link, (), words, float(chances[-1])))
     measure = dict.fromkeys(
         measurement(effect, joint, arm)
         for effect, joint in ((mistake.effect, mistake.joint), *((each.effect, each.joint) for each in listed))

@@ -42,7 +42,7 @@ OF_ANY_SIGN = (3, SPRING)  # the others are not negative
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
+class ReadingColumns:
     """Columns of a motion: rigid (rows, joints, 10 * joints), own (rows, joints, 8), and their products on each fold.
 
     grams: (folds, joints, size, size) of the rigid columns followed by the joint's own ones. stated: (rows, joints),
@@ -58,7 +58,7 @@ class Columns:
     coupled: Array
 
 
-def make_columns(arm: Arm, motion: Motion, drives: Array, fold: NDArray[np.intp]) -> Columns:
+def make_columns(arm: Arm, motion: Motion, drives: Array, fold: NDArray[np.intp]) -> ReadingColumns:
     """The columns of a motion (rows, joints).
 
     drives: (rows, joints, 2, 3), velocity, its sign and acceleration of each joint's own drive and of a second one,
@@ -75,11 +75,11 @@ def make_columns(arm: Arm, motion: Motion, drives: Array, fold: NDArray[np.intp]
             used = np.arange(10 * joint, 10 * joints + JOINT_COLUMNS)  # links before a joint do not load it
             part = np.concatenate([rigid[rows, joint, 10 * joint :], own[rows, joint]], axis=1)
             grams[number, joint][np.ix_(used, used)] = part.T @ part
-    return Columns(motion, rigid, own, grams, position_torque(arm, motion), coupled_links_torque(arm, motion))
+    return ReadingColumns(motion, rigid, own, grams, position_torque(arm, motion), coupled_links_torque(arm, motion))
 
 
 @dataclass(frozen=True, eq=False)
-class Prior:
+class BodyPrior:
     """Bodies that links are drawn to: centre (10 * joints,), and the information about it at width one."""
 
     centre: Array
@@ -88,19 +88,19 @@ class Prior:
 
 
 @lru_cache(maxsize=64)
-def _typical_prior(arm: Arm, mass: float, reach: float) -> Prior:
+def _typical_prior(arm: Arm, mass: float, reach: float) -> BodyPrior:
     body = mass * np.array([0.1, 0.1, 0.1]) * reach**2
     links = tuple(Link(mass, (0.0, 0.0, 0.0), (*(2 * body).tolist(), 0.0, 0.0, 0.0)) for _ in arm.joints)
     return _prior(replace(arm, links=links))
 
 
-def _prior(arm: Arm) -> Prior:
+def _prior(arm: Arm) -> BodyPrior:
     pseudos = regular_nominal(arm)
-    return Prior(arm.parameters, entropic_information(pseudos), pseudos)
+    return BodyPrior(arm.parameters, entropic_information(pseudos), pseudos)
 
 
 @dataclass(frozen=True, eq=False)
-class Score:
+class ReadingScore:
     """Held-out errors of a reading. errors: (joints,), rms over the scatter of the joint's torque.
 
     values: (folds, 10 * joints) of the links, own: (folds, joints, 8) of the joints. distance: of the links from those
@@ -114,7 +114,7 @@ class Score:
 
 
 @dataclass(frozen=True, eq=False)
-class _Layout:
+class _FreeColumns:
     """Which columns a fit has: all of the links, then own ones. present: (joints, 8); the others stay zero.
 
     kept: places among all columns; signed: places among the kept ones that are not negative, rest: of the others.
@@ -127,7 +127,7 @@ class _Layout:
 
 
 @lru_cache(maxsize=64)
-def _layout(joints: int, springs: tuple[int, ...], second: tuple[bool, ...]) -> _Layout:
+def _layout(joints: int, springs: tuple[int, ...], second: tuple[bool, ...]) -> _FreeColumns:
     """All joints have friction, a rotor and an offset; some have a spring or a second drive."""
     present = np.zeros((joints, JOINT_COLUMNS), dtype=bool)
     present[:, :SPRING] = True
@@ -136,7 +136,7 @@ def _layout(joints: int, springs: tuple[int, ...], second: tuple[bool, ...]) -> 
     links, own = 10 * joints, np.flatnonzero(present)
     signed = links + np.flatnonzero(~np.isin(own % JOINT_COLUMNS, OF_ANY_SIGN))
     rest = np.setdiff1d(np.arange(links + len(own)), signed)
-    return _Layout(present, np.concatenate([np.arange(links), links + own]), signed, rest)
+    return _FreeColumns(present, np.concatenate([np.arange(links), links + own]), signed, rest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,15 +145,15 @@ class Fitter:
 
     channels: Channels
     tuning: ReadingTuning
-    _columns: dict[tuple[object, ...], Columns] = field(default_factory=dict)
-    _priors: dict[bytes, Prior] = field(default_factory=dict)
+    _columns: dict[tuple[object, ...], ReadingColumns] = field(default_factory=dict)
+    _priors: dict[bytes, BodyPrior] = field(default_factory=dict)
 
     @property
     def fold(self) -> NDArray[np.intp]:
         """(rows,), 0 for even blocks and 1 for odd ones."""
         return np.asarray(self.channels.block % FOLDS, dtype=np.intp)
 
-    def columns(self, reading: Reading) -> Columns:
+    def columns(self, reading: Reading) -> ReadingColumns:
         """Columns of a reading's motion, kept for readings that differ in torque alone."""
         key = (
             reading.position.tobytes(),
@@ -171,7 +171,7 @@ class Fitter:
             self._columns[key] = make_columns(reading.arm, motion, drive_signals, self.fold)
         return self._columns[key]
 
-    def prior(self, reading: Reading, torque: Array) -> Prior:
+    def prior(self, reading: Reading, torque: Array) -> BodyPrior:
         """About the links of the simulation, or about bodies of the size that the torque suggests."""
         arm = reading.arm
         if reading.inertial is not None:
@@ -184,7 +184,7 @@ class Fitter:
         mass = float(np.std(torque, axis=0).max()) / (9.81 * (reach if turning else 1.0))
         return _typical_prior(arm, 2.0 ** round(np.log2(max(mass, 1e-6))), round(reach, 3))
 
-    def scores(self, reading: Reading, widths: Sequence[float], physical: bool = False) -> list[Score]:
+    def scores(self, reading: Reading, widths: Sequence[float], physical: bool = False) -> list[ReadingScore]:
         """Held-out errors with links of each width about the simulation.
 
         The last link may carry a load: it is free in any case. physical: links that bodies can have.
@@ -211,10 +211,10 @@ class Fitter:
                 fitted.append((links, own))
             values, owns = (np.stack(parts) for parts in zip(*fitted, strict=True))
             errors = np.sqrt(np.maximum(squares, 0.0) / len(torque)) * weight
-            out.append(Score(errors, values, owns, distance))
+            out.append(ReadingScore(errors, values, owns, distance))
         return out
 
-    def _target(self, reading: Reading) -> tuple[Columns, Array, Array]:
+    def _target(self, reading: Reading) -> tuple[ReadingColumns, Array, Array]:
         """Columns, the torque (rows, joints) that they have to explain, and one over its scatter (joints,).
 
         Gravity that is added back makes no error smaller beside it: the scatter is that of what was recorded.
@@ -224,7 +224,7 @@ class Fitter:
         torque, scatter = recorded + self.channels.added_gravity(reading), np.std(recorded, axis=0)
         return columns, torque, np.where(scatter > 0, 1 / np.where(scatter > 0, scatter, 1.0), 0.0)
 
-    def shares(self, reading: Reading, score: Score) -> Array:
+    def shares(self, reading: Reading, score: ReadingScore) -> Array:
         """Mean squares of the held-out errors over the scatter of the joint's torque, (blocks, joints)."""
         columns, torque, weight = self._target(reading)
         out = np.zeros((self.channels.blocks, reading.joints))
@@ -236,7 +236,7 @@ class Fitter:
         return out / np.bincount(self.channels.block, minlength=self.channels.blocks)[:, None]
 
     def _normal_equations(
-        self, columns: Columns, products: Sequence[Array], weight: Array, fold: int, layout: _Layout
+        self, columns: ReadingColumns, products: Sequence[Array], weight: Array, fold: int, layout: _FreeColumns
     ) -> tuple[Array, Array]:
         """Gram matrix and product with the torque, in nats, of the rows of a fold."""
         joints, rows = len(weight), self.fold == fold
@@ -300,7 +300,7 @@ class Fitter:
         return out
 
 
-def _products(columns: Columns, torque: Array, rows: NDArray[np.bool_]) -> Array:
+def _products(columns: ReadingColumns, torque: Array, rows: NDArray[np.bool_]) -> Array:
     """Products with the torque of each joint, (joints, 10 * joints + 5), in the order of the Gram matrices."""
     rigid = np.einsum("rjp,rj->jp", columns.rigid[rows], torque[rows])
     own = np.einsum("rjk,rj->jk", columns.own[rows], torque[rows])
@@ -319,9 +319,9 @@ class _Task:
 
     gram: Array
     product: Array
-    prior: Prior
+    prior: BodyPrior
     precision: Array  # (joints,) of the prior of each link
-    layout: _Layout
+    layout: _FreeColumns
 
     @property
     def joints(self) -> int:

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.recordings.reading.fit import Fitter, Score
+from armlab.recordings.reading.fit import Fitter, ReadingScore
 from armlab.recordings.reading.mistakes import POSITION, TORQUE, improbability, is_of_one_joint
 from armlab.recordings.reading.reading import Mistake, Reading
 from armlab.recordings.reading.signals import thin_channels
@@ -116,7 +116,7 @@ class Gain:
 
 
 @dataclass(frozen=True, eq=False)
-class Judge:
+class ReadingJudge:
     """Scores readings of one recording.
 
     fitter: of the instants on which readings are looked for. judging: of those on which they are judged. looks: counts
@@ -130,7 +130,7 @@ class Judge:
     _errors: dict[int, tuple[Reading, Errors, Errors]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, recording: Recording, tuning: ReadingTuning) -> "Judge | None":
+    def of(cls, recording: Recording, tuning: ReadingTuning) -> "ReadingJudge | None":
         """The judge of a recording; None where it is too short or its transmission cannot be undone."""
         rows = thin_channels(recording, tuning)
         return None if rows is None else cls(Fitter(rows.search, tuning), Fitter(rows.judge, tuning), recording)
@@ -177,7 +177,7 @@ class Judge:
             self._errors[id(reading)] = (reading, out[0], out[-1])
         return self._errors[id(reading)][1:]
 
-    def _best_fit(self, reading: Reading, fits: Sequence[Score]) -> Errors:
+    def _best_fit(self, reading: Reading, fits: Sequence[ReadingScore]) -> Errors:
         """Of each joint the fit that predicts it better: a reading that is wrong does so by both."""
         shares = [self.judging.shares(reading, each) for each in fits]
         better = np.argmin([each.errors for each in fits], axis=0)

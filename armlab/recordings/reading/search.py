@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armlab.recordings.reading import mistakes as table
-from armlab.recordings.reading.judge import Judge, Trial
+from armlab.recordings.reading.judge import ReadingJudge, Trial
 from armlab.recordings.reading.reading import SPRING, Mistake, Reading
 from armlab.recordings.reading.singles import search_singles
 from armlab.recordings.reading.tuning import ReadingTuning
@@ -31,7 +31,7 @@ class Found:
     looks: int = 0
 
 
-def find_mistakes(judge: Judge, start: Trial) -> Found:
+def find_mistakes(judge: ReadingJudge, start: Trial) -> Found:
     """The mistakes of a reading, at most as many as the tuning allows; none where all joints leave what is usual."""
     tuning = judge.tuning
     if judge.is_usual(start):
@@ -75,7 +75,7 @@ def _is_better(other: Trial, best: Trial, tuning: ReadingTuning) -> bool:
     )
 
 
-def _extend(judge: Judge, trial: Trial, singles: list[Trial]) -> tuple[Trial, list[Trial]]:
+def _extend(judge: ReadingJudge, trial: Trial, singles: list[Trial]) -> tuple[Trial, list[Trial]]:
     """Takes the best accepted mistake, one after the other; the last list of single mistakes beside it."""
     while len(trial.reading.mistakes) < judge.tuning.max_mistakes:
         accepted = next((each for each in singles if judge.is_accepted(trial, each)), None)
@@ -95,7 +95,7 @@ def _distinct(singles: list[Trial], count: int) -> list[Trial]:
 
 
 def _in_each_place(
-    judge: Judge, start: Trial, best: Trial, singles: list[Trial]
+    judge: ReadingJudge, start: Trial, best: Trial, singles: list[Trial]
 ) -> tuple[tuple[Trial, ...], list[list[Trial]]]:
     """The readings that leave out one mistake of the best one, in their order, and what may stand in its place.
 
@@ -105,7 +105,7 @@ def _in_each_place(
     return without, [singles] if len(without) == 1 else [search_singles(judge, each) for each in without]
 
 
-def _without_each(judge: Judge, start: Trial, best: Trial) -> tuple[Trial, ...]:
+def _without_each(judge: ReadingJudge, start: Trial, best: Trial) -> tuple[Trial, ...]:
     """The readings that leave out one mistake of the best one, in their order."""
     own = best.reading.mistakes
     if len(own) == 1:
@@ -114,7 +114,7 @@ def _without_each(judge: Judge, start: Trial, best: Trial) -> tuple[Trial, ...]:
     return tuple(judge.trial(rebuild(judge, start.reading, each)) for each in others)
 
 
-def _merge_at_joints(judge: Judge, start: Trial, best: Trial) -> Trial:
+def _merge_at_joints(judge: ReadingJudge, start: Trial, best: Trial) -> Trial:
     """The reading with one mistake of a joint where it has several and one explains as much: the first was a part."""
     own = best.reading.mistakes
     places = [_place(each) for each in own]
@@ -134,7 +134,9 @@ def _place(mistake: Mistake) -> str:
     return mistake.label if mistake.joint is None else str(mistake.joint)
 
 
-def _better_in_place(judge: Judge, without: tuple[Trial, ...], lists: list[list[Trial]], best: Trial) -> Trial | None:
+def _better_in_place(
+    judge: ReadingJudge, without: tuple[Trial, ...], lists: list[list[Trial]], best: Trial
+) -> Trial | None:
     """A reading that is better without a mistake, or with another in its place; a first step may have been wrong."""
     for parent, singles, mistake in zip(without, lists, best.reading.mistakes, strict=True):
         if not judge.is_accepted(parent, best, mistake):
@@ -146,7 +148,7 @@ def _better_in_place(judge: Judge, without: tuple[Trial, ...], lists: list[list[
     return None
 
 
-def _rivals(judge: Judge, without: Trial, best: Trial, place: int, singles: list[Trial]) -> tuple[Trial, ...]:
+def _rivals(judge: ReadingJudge, without: Trial, best: Trial, place: int, singles: list[Trial]) -> tuple[Trial, ...]:
     """Readings with another mistake at one place that fit as well as the best one. singles: beside the other ones."""
     tuning = judge.tuning
     out = {_name(best.reading.mistakes[place]): best}
@@ -159,7 +161,7 @@ def _rivals(judge: Judge, without: Trial, best: Trial, place: int, singles: list
     return tuple(out.values())[1:]
 
 
-def _margin(judge: Judge, best: Trial, place: int, singles: list[Trial]) -> float:
+def _margin(judge: ReadingJudge, best: Trial, place: int, singles: list[Trial]) -> float:
     """Standard errors by which the next best reading with another mistake at one place is worse, accepted or not."""
     own = _name(best.reading.mistakes[place])
     others = [each for each in singles if _name(each.reading.mistakes[-1]) != own]
@@ -172,7 +174,7 @@ def _name(mistake: Mistake) -> tuple[str, str]:
     return mistake.label, mistake.form
 
 
-def _undecided(judge: Judge, singles: list[Trial], best: Trial) -> tuple[int, ...]:
+def _undecided(judge: ReadingJudge, singles: list[Trial], best: Trial) -> tuple[int, ...]:
     """Joints whose zero may as well be a multiple of 90 degrees off."""
     out = set()
     for each in singles:
@@ -185,7 +187,7 @@ def _undecided(judge: Judge, singles: list[Trial], best: Trial) -> tuple[int, ..
     return tuple(sorted(out))
 
 
-def rebuild(judge: Judge, reading: Reading, mistakes: Iterable[Mistake]) -> Reading:
+def rebuild(judge: ReadingJudge, reading: Reading, mistakes: Iterable[Mistake]) -> Reading:
     """The reading with mistakes taken back one after the other."""
     for mistake in mistakes:
         reading = table.take_back(reading, mistake, judge.recording)

@@ -116,14 +116,14 @@ class Channels:
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class ThinnedRows:
     """The instants on which readings are looked for, and those on which they are judged."""
 
     search: Channels
     judge: Channels
 
 
-def thin_channels(recording: Recording, tuning: ReadingTuning) -> Rows | None:
+def thin_channels(recording: Recording, tuning: ReadingTuning) -> ThinnedRows | None:
     """The channels of the runs that identify; None where they are too short or the transmission cannot be undone."""
     given = recording.transmission
     to_torque = given.torque * given.gains
@@ -134,7 +134,7 @@ def thin_channels(recording: Recording, tuning: ReadingTuning) -> Rows | None:
     if min(_length(run) for run in runs) < tuning.min_run_s:
         return None
     signals = [differentiate(run, cutoff_hz=_cutoff_hz(run)) for run in map(resample_evenly, runs)]
-    return Rows(
+    return ThinnedRows(
         _channels(recording, signals, tuning, SEARCHED),
         _channels(recording, signals, tuning, tuple(not each for each in SEARCHED)),
     )

@@ -8,12 +8,12 @@ from scipy.optimize import minimize, minimize_scalar
 
 from armlab.common.arrays import Array
 from armlab.recordings.reading import mistakes as table
-from armlab.recordings.reading.judge import Judge, Trial
+from armlab.recordings.reading.judge import ReadingJudge, Trial
 from armlab.recordings.reading.mistakes import joint_names
 from armlab.recordings.reading.reading import Reading
 
 
-def search_singles(judge: Judge, start: Trial) -> list[Trial]:
+def search_singles(judge: ReadingJudge, start: Trial) -> list[Trial]:
     """Every mistake alone on top of a reading, refined, and springs of its joints beside them, the best first."""
     reading = start.reading
     absurd = judge.fitter.implausible(reading)
@@ -34,11 +34,11 @@ def search_singles(judge: Judge, start: Trial) -> list[Trial]:
     return sorted(found, key=partial(_rank, judge))
 
 
-def _rank(judge: Judge, trial: Trial) -> float:
+def _rank(judge: ReadingJudge, trial: Trial) -> float:
     return trial.loss + judge.improbability(trial.reading)
 
 
-def _exact(judge: Judge, reading: Reading) -> Iterable[Reading]:
+def _exact(judge: ReadingJudge, reading: Reading) -> Iterable[Reading]:
     yield from table.signs(reading)
     yield from table.exchanges(reading, joint_names(reading.arm))
     yield from table.couplings(reading)
@@ -52,7 +52,7 @@ def _exact(judge: Judge, reading: Reading) -> Iterable[Reading]:
         yield from _torque_factors(judge, reading)
 
 
-def _torque_factors(judge: Judge, reading: Reading) -> Iterable[Reading]:
+def _torque_factors(judge: ReadingJudge, reading: Reading) -> Iterable[Reading]:
     """Factors between the torque and that of the links as given, where they are far from one."""
     score = judge.fitter.torque_gains(reading)
     own = np.array([gain for gain, _ in score])
@@ -63,7 +63,7 @@ def _torque_factors(judge: Judge, reading: Reading) -> Iterable[Reading]:
         yield from _torque_factor(judge, reading, int(joint), float(own[joint]))
 
 
-def _torque_factor(judge: Judge, reading: Reading, joint: int | None, factor: float) -> Iterable[Reading]:
+def _torque_factor(judge: ReadingJudge, reading: Reading, joint: int | None, factor: float) -> Iterable[Reading]:
     limit = judge.tuning.min_unit_factor
     if factor > limit or 0 < factor < 1 / limit:
         near = min(table.TORQUE_UNITS, key=lambda each: abs(np.log(each / factor)))
@@ -71,7 +71,7 @@ def _torque_factor(judge: Judge, reading: Reading, joint: int | None, factor: fl
         yield table.unit_error(reading, joint, table.TORQUE, near if known else factor)
 
 
-def _refine(make: Callable[[float], Reading], judge: Judge, around: float, reach: float) -> Trial:
+def _refine(make: Callable[[float], Reading], judge: ReadingJudge, around: float, reach: float) -> Trial:
     """The best reading of a number within a reach of a start."""
     outcome = minimize_scalar(
         lambda value: judge.trial(make(float(value))).loss,
@@ -82,7 +82,7 @@ def _refine(make: Callable[[float], Reading], judge: Judge, around: float, reach
     return judge.trial(make(float(outcome.x)))
 
 
-def _zeros(judge: Judge, start: Trial) -> list[Trial]:
+def _zeros(judge: ReadingJudge, start: Trial) -> list[Trial]:
     """Zeros of each joint that turns: scanned, the best refined, a quarter of a turn where that is as good."""
     out = []
     for joint, own in enumerate(start.reading.arm.joints):
@@ -110,7 +110,7 @@ def _half_turn(angle: float) -> float:
     return (angle + 180) % 360 - 180
 
 
-def _is_quarter(judge: Judge, turned: Trial | None, refined: Trial, angle: float) -> bool:
+def _is_quarter(judge: ReadingJudge, turned: Trial | None, refined: Trial, angle: float) -> bool:
     """Whether a zero is a multiple of 90 degrees: near it, or the data do not tell it from one not far away."""
     if turned is None:
         return False
@@ -120,7 +120,7 @@ def _is_quarter(judge: Judge, turned: Trial | None, refined: Trial, angle: float
     return off < judge.tuning.quarter_reach_deg and judge.fits_alike(turned, refined)
 
 
-def _gravities(judge: Judge, start: Trial) -> list[Trial]:
+def _gravities(judge: ReadingJudge, start: Trial) -> list[Trial]:
     """Directions of gravity: the best of some, refined over both angles."""
     size = table.size_of_gravity(start.reading)
     coarse = [judge.trial(each) for each in table.gravity_directions(start.reading)]
@@ -143,7 +143,7 @@ def _gravities(judge: Judge, start: Trial) -> list[Trial]:
     return [*coarse, refined]
 
 
-def _is_level(judge: Judge, coarse: list[Trial], refined: Trial) -> bool:
+def _is_level(judge: ReadingJudge, coarse: list[Trial], refined: Trial) -> bool:
     """Whether the data do not tell gravity from a near axis of the base: floors, walls and ceilings are level."""
     own = np.array(refined.reading.arm.gravity)
     for each in coarse:
@@ -159,7 +159,7 @@ def angle_between(first: Array, second: Array) -> float:
     return float(np.rad2deg(np.arccos(np.clip(first @ second / size, -1, 1)))) if size > 0 else 180.0
 
 
-def _delays(judge: Judge, start: Trial) -> list[Trial]:
+def _delays(judge: ReadingJudge, start: Trial) -> list[Trial]:
     """Shifts of torque, of all joints and of one."""
     margin, least = judge.fitter.channels.margin_s, judge.tuning.min_delay_s
     if margin <= least:
@@ -183,7 +183,7 @@ def _delays(judge: Judge, start: Trial) -> list[Trial]:
     return out
 
 
-def _clocks(judge: Judge, start: Trial) -> list[Trial]:
+def _clocks(judge: ReadingJudge, start: Trial) -> list[Trial]:
     """Clocks that run too fast or too slow."""
     if judge.clock_is_right:
         return []
@@ -202,7 +202,7 @@ def _clocks(judge: Judge, start: Trial) -> list[Trial]:
     return [refined] if abs(np.log(factor)) >= np.log(judge.tuning.min_clock_factor) else []
 
 
-def _gears(judge: Judge, start: Trial) -> list[Trial]:
+def _gears(judge: ReadingJudge, start: Trial) -> list[Trial]:
     """Ratios of gears, of joints that travel further than an arm can or hardly at all."""
     out = []
     motion = judge.fitter.columns(start.reading).motion

@@ -24,7 +24,7 @@ from armlab.diagnosis.motion.compare_load import compare_load
 from armlab.diagnosis.motion.tuning import DEFAULT
 from armlab.effects.library import effect_named
 from armlab.recordings.motion import load_motion_recording
-from armlab.report.changes.report import write_comparison
+from armlab.report.changes.comparison_report import write_comparison
 from problem.arm import Arm
 from problem.joint_words import joint_in_table, joint_in_words
 

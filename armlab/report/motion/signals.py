@@ -1,6 +1,6 @@
 """Topics of `signals.mcap` where a recording has no torque: commands, measured and replayed positions."""
 
-from armlab.diagnosis.motion.result import MotionDiagnosis
+from armlab.diagnosis.motion.motion_result import MotionDiagnosis
 from armlab.report.signals_file import Track, recorded_track, topic_names
 
 

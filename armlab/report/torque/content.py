@@ -12,8 +12,8 @@ from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.effects.library import effect_named
 from armlab.identification.export import has_place_in_simulator
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER
-from armlab.report.told.steps import next_steps
-from armlab.report.told.told import ToldFinding, finding_errors, tell
+from armlab.report.account.account import StatedFinding, account_of, finding_errors
+from armlab.report.account.next_steps import next_steps
 from armlab.report.torque.gallery import Gallery
 from armlab.report.torque.residuals import ShownResiduals, correlation_seconds, filter_correlation_seconds, is_white
 from armlab.report.words import (
@@ -87,7 +87,7 @@ def error_note(diagnosis: Diagnosis, data: ShownResiduals) -> str:
 def cause_table(diagnosis: Diagnosis) -> Table | None:
     """The causes with their findings, the largest first; None without findings."""
     rows = []
-    for each in tell(diagnosis).causes:
+    for each in account_of(diagnosis).causes:
         names = dict.fromkeys(effect_in_words(diagnosis.claims[place].effect) for place in each.findings)
         joints = ", ".join(joint_in_table(diagnosis.simulation.arm, joint) for joint in each.joints) or "all"
         rows.append([each.cause.replace("_", " "), joints, format_share(each.share), join_words(list(names))])
@@ -161,13 +161,14 @@ def finding_details(diagnosis: Diagnosis, gallery: Gallery, minor: bool = False)
 
     minor: those that are not told instead.
     """
-    pictures, told = {id(claim): picture for claim, picture in gallery.evidence}, tell(diagnosis)
+    pictures, account = {id(claim): picture for claim, picture in gallery.evidence}, account_of(diagnosis)
     return [
-        _finding_detail(diagnosis, each, pictures[id(each.claim)]) for each in (told.minor if minor else told.findings)
+        _finding_detail(diagnosis, each, pictures[id(each.claim)])
+        for each in (account.minor if minor else account.findings)
     ]
 
 
-def _finding_detail(diagnosis: Diagnosis, finding: ToldFinding, picture: Markup) -> FindingDetail:
+def _finding_detail(diagnosis: Diagnosis, finding: StatedFinding, picture: Markup) -> FindingDetail:
     claim, arm = finding.claim, diagnosis.simulation.arm
     joint = (claim.removal or claim.evidence).joint
     size, where = joint_unit(arm, joint), joint_in_words(arm, joint + 1)
@@ -230,7 +231,7 @@ def _rival_texts(arm: Arm, claim: Claim) -> list[str]:
 def left_table(diagnosis: Diagnosis) -> Table:
     """What is left at each joint: of its torque, beside the noise, and on what it depends most."""
     arm, rows = diagnosis.simulation.arm, []
-    for each in tell(diagnosis).left:
+    for each in account_of(diagnosis).left:
         size = joint_unit(arm, each.joint - 1)
         errors = [f"{format_number(value)} {size}" for value in (each.rms, each.noise)]
         depends = variables_in_words(arm, each.depends_on) if each.depends_on else "–"
@@ -257,7 +258,7 @@ def steps_and_uses(diagnosis: Diagnosis) -> list[str]:
     """What decides what is open, and what to do with the model."""
     if not diagnosis.fit:
         return []
-    asked = list(next_steps(diagnosis, tell(diagnosis)))
+    asked = list(next_steps(diagnosis, account_of(diagnosis)))
     if any(_motion_may_tell(claim) for claim in diagnosis.claims):
         asked.append("`armlab next verdict.json --robot ROBOT` designs a motion that decides between rivals.")
     held = "the links and every named effect"

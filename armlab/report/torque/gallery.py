@@ -7,7 +7,7 @@ from markupsafe import Markup
 
 from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.effects.library import effect_named
-from armlab.report.told.told import tell
+from armlab.report.account.account import account_of
 from armlab.report.torque.arm_picture import JointMark, clearest_posture, draw_arm
 from armlab.report.torque.motion_pictures import draw_motion, draw_motion_differences
 from armlab.report.torque.residuals import ShownResiduals, space_rows
@@ -59,7 +59,7 @@ def draw_gallery(diagnosis: Diagnosis, data: ShownResiduals) -> Gallery:
     arm = diagnosis.simulation.arm
     postures = data.observed.kept("position")[space_rows(np.arange(data.observed.rows), MAX_POSTURES)]
     position = clearest_posture(arm, postures)
-    whole = [claim_in_words(each.claim) for each in tell(diagnosis).findings if each.claim.joint is None]
+    whole = [claim_in_words(each.claim) for each in account_of(diagnosis).findings if each.claim.joint is None]
     worst = [each.joint for each in diagnosis.located[:MAX_LOCATED_JOINTS]]
     located = [(joint, draw_located_errors(diagnosis, data, joint - 1)) for joint in worst]
     motions, motion_text = draw_motion(diagnosis)
@@ -80,9 +80,9 @@ def draw_gallery(diagnosis: Diagnosis, data: ShownResiduals) -> Gallery:
 
 
 def joint_marks(diagnosis: Diagnosis) -> dict[int, JointMark]:
-    """What was found at each joint, in the picture of the arm: what is told, by its share of the error."""
+    """What was found at each joint, in the picture of the arm: what is stated, by its share of the error."""
     causes: dict[int, dict[str, None]] = {}
-    for claim in (each.claim for each in tell(diagnosis).findings):
+    for claim in (each.claim for each in account_of(diagnosis).findings):
         if claim.joint is not None:
             is_link = effect_named(claim.effect).where == "link"
             causes.setdefault(claim.joint, {})[f"{'link: ' if is_link else ''}{claim_in_words(claim)}"] = None

@@ -13,8 +13,8 @@ from armlab.effects.drive import ROTOR_INERTIA_FACTS
 from armlab.effects.friction import COULOMB_FACTS, VISCOUS_FACTS
 from armlab.effects.library import effect_named
 from armlab.effects.links import PAYLOAD_FACTS
-from armlab.report.told.summary import speed_unit
-from armlab.report.told.told import Told, ToldFinding, tell
+from armlab.report.account.account import Account, StatedFinding, account_of
+from armlab.report.account.summary import speed_unit
 from armlab.report.torque.sentences import claim_figures, finding_sentence, number_in_words
 from armlab.report.words import (
     effect_in_words,
@@ -36,14 +36,19 @@ def joint_table(diagnosis: Diagnosis) -> Table:
     """What was found at each joint, minor findings left out: all friction, then by its laws and other effects, and what
     is left. Laws and effects are what is to be added to the simulation.
     """
-    arm, told = diagnosis.simulation.arm, tell(diagnosis)
-    found = [each for each in told.findings if each.claim.effect != PAYLOAD_FACTS.id]
+    arm, account = diagnosis.simulation.arm, account_of(diagnosis)
+    found = [each for each in account.findings if each.claim.effect != PAYLOAD_FACTS.id]
     columns = [effect for effect in OWN_COLUMN if any(each.claim.effect == effect.id for each in found)]
     rows = list[list[str]]()
     for number in range(1, len(arm) + 1):
         own = [each for each in found if each.claim.joint == number]
         cells = _cells(own, columns, diagnosis.simulation)
-        row = [joint_in_table(arm, number), friction_cell(told, number, arm), *cells, _left_cell(told, number, arm)]
+        row = [
+            joint_in_table(arm, number),
+            friction_cell(account, number, arm),
+            *cells,
+            _left_cell(account, number, arm),
+        ]
         rows.append(row)
     whole = [each for each in found if each.claim.joint is None]
     if whole:
@@ -59,9 +64,9 @@ def _is_used(rows: Sequence[Sequence[str]], place: int) -> bool:
     return any(row[place] != NOTHING for row in rows)
 
 
-def friction_cell(told: Told, joint: int, arm: Arm) -> str:
+def friction_cell(account: Account, joint: int, arm: Arm) -> str:
     """`2.10 N m at 0.10 rad/s, 3.40 N m at 1.0 rad/s`."""
-    row = told.friction_of(joint)
+    row = account.friction_of(joint)
     if row is None:
         return NOTHING
     unit = joint_unit(arm, joint - 1)
@@ -70,9 +75,9 @@ def friction_cell(told: Told, joint: int, arm: Arm) -> str:
     return ", ".join((_together(f"{low} at {first}"), _together(f"{high} at {last}")))
 
 
-def _left_cell(told: Told, joint: int, arm: Arm) -> str:
+def _left_cell(account: Account, joint: int, arm: Arm) -> str:
     """`18 %, 3.76 N m`, marked where real arms leave less."""
-    for each in told.left:
+    for each in account.left:
         if each.joint == joint:
             usual = "" if each.usual else ", unusual"
             size = f"{format_number(each.rms)} {joint_unit(arm, joint - 1)}"
@@ -82,7 +87,7 @@ def _left_cell(told: Told, joint: int, arm: Arm) -> str:
 
 def joints_without_finding(diagnosis: Diagnosis) -> str:
     """`Nothing was found at joints 1, 2 and 5.`; empty where each has a finding."""
-    guilty = {each.claim.joint for each in tell(diagnosis).findings if each.claim.effect != PAYLOAD_FACTS.id}
+    guilty = {each.claim.joint for each in account_of(diagnosis).findings if each.claim.effect != PAYLOAD_FACTS.id}
     arm = diagnosis.simulation.arm
     free = [number for number in range(1, len(arm) + 1) if number not in guilty]
     return f"Nothing of practical size was found at {joints_in_words(arm, free)}." if free else ""
@@ -92,7 +97,7 @@ def _heading(effect: Effect) -> str:
     return effect.words[0].upper() + effect.words[1:]
 
 
-def _cells(found: Sequence[ToldFinding], columns: Sequence[Effect], simulation: Simulation) -> list[str]:
+def _cells(found: Sequence[StatedFinding], columns: Sequence[Effect], simulation: Simulation) -> list[str]:
     cells = []
     for effect in columns:
         own = [each for each in found if each.claim.effect == effect.id]
@@ -107,7 +112,7 @@ def _cells(found: Sequence[ToldFinding], columns: Sequence[Effect], simulation: 
     return [*cells, "; ".join(others) or NOTHING]
 
 
-def _other_cell(found: ToldFinding, simulation: Simulation) -> str:
+def _other_cell(found: StatedFinding, simulation: Simulation) -> str:
     """The effect with the numbers that its sentence has, else with its first one."""
     claim = found.claim
     if claim.effect == UNKNOWN.id:
@@ -135,7 +140,7 @@ def _together(text: str) -> str:
     return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
-def doubt_in_words(found: ToldFinding) -> str:
+def doubt_in_words(found: StatedFinding) -> str:
     """What else it may be: the other names of its class, or that its law is not certain."""
     if found.statement.kind == "class":
         others = [effect_in_words(each) for each in found.statement.effects if each != found.claim.effect]
@@ -147,6 +152,6 @@ def body_sentences(diagnosis: Diagnosis) -> list[str]:
     """Each payload with its mass, and where its centre of mass is in the frame of its joint."""
     return [
         f"{finding_sentence(each.claim, diagnosis.simulation)}."
-        for each in tell(diagnosis).findings
+        for each in account_of(diagnosis).findings
         if each.claim.effect == PAYLOAD_FACTS.id
     ]

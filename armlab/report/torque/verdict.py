@@ -10,9 +10,9 @@ from armlab.diagnosis.torque.names.findings import FRICTION
 from armlab.diagnosis.torque.rows.simulation import Simulation
 from armlab.effects.links import PAYLOAD_FACTS
 from armlab.recordings.reading.answer import SetupFinding
-from armlab.report.told.steps import next_steps
-from armlab.report.told.summary import physics_in_words, sentences_of, shorter_list
-from armlab.report.told.told import Told, ToldFinding, finding_errors, tell
+from armlab.report.account.account import Account, StatedFinding, account_of, finding_errors
+from armlab.report.account.next_steps import next_steps
+from armlab.report.account.summary import physics_in_words, sentences_of, shorter_list
 from armlab.report.torque.measured import NOTHING, doubt_in_words, friction_cell
 from armlab.report.torque.residuals import select_residuals
 from armlab.report.torque.sentences import claim_figures, model_in_words, simulated_figures
@@ -88,7 +88,7 @@ def verdict_lines(diagnosis: Diagnosis, verbose: bool = False) -> Iterator[str]:
     verbose: every finding with its evidence, what is left, and the errors of each joint, too.
     """
     first, second = verdict_sentences(diagnosis)
-    arm, told = diagnosis.simulation.arm, tell(diagnosis)
+    arm, account = diagnosis.simulation.arm, account_of(diagnosis)
     yield from wrap(f"{diagnosis.status.upper()}: {first} {second}", LINE_WIDTH)
     signs = [each for each in diagnosis.signs if each.severity != "note"]
     warnings = [f"  {line}" for sign in signs for line in wrap(f"warning: {sign.text}", LINE_WIDTH - 2)]
@@ -99,27 +99,27 @@ def verdict_lines(diagnosis: Diagnosis, verbose: bool = False) -> Iterator[str]:
     for number, mistake in enumerate(setup, 1):
         yield from _setup_lines(number, mistake, arm)
     if diagnosis.claims:
-        yield from _joint_lines(diagnosis, told)
-    if told.minor:
-        yield f"  {count_of(len(told.minor), 'small difference')} more, in verdict.json and folded on the page"
+        yield from _joint_lines(diagnosis, account)
+    if account.minor:
+        yield f"  {count_of(len(account.minor), 'small difference')} more, in verdict.json and folded on the page"
     if diagnosis.is_plain:
         yield "  model.yaml holds plain least squares: it predicts blocks of these runs better than the named effects"
-    for number, step in enumerate(next_steps(diagnosis, told), 1):
+    for number, step in enumerate(next_steps(diagnosis, account), 1):
         yield from (f"  {line}" for line in wrap(f"next {number}: {step}", LINE_WIDTH - 2))
     if verbose:
-        yield from _detail_lines(diagnosis, told)
+        yield from _detail_lines(diagnosis, account)
 
 
-def _joint_lines(diagnosis: Diagnosis, told: Told) -> Iterator[str]:
+def _joint_lines(diagnosis: Diagnosis, account: Account) -> Iterator[str]:
     """A row a joint: all its friction, what was found by name, and what is left of the torque."""
     arm, joints = diagnosis.simulation.arm, range(1, len(diagnosis.simulation.arm) + 1)
     rows = [["joint", "friction", "left", "found"]]
     for joint in joints:
-        own = [each for each in told.findings if each.claim.joint == joint]
+        own = [each for each in account.findings if each.claim.joint == joint]
         name = shorten_name(joint_in_table(arm, joint))
-        left = next((f"{100 * each.share_of_torque:.0f} %" for each in told.left if each.joint == joint), NOTHING)
-        rows.append([name, friction_cell(told, joint, arm), left, _found_in_words(own, diagnosis.simulation)])
-    whole = [each for each in told.findings if each.claim.joint is None]
+        left = next((f"{100 * each.share_of_torque:.0f} %" for each in account.left if each.joint == joint), NOTHING)
+        rows.append([name, friction_cell(account, joint, arm), left, _found_in_words(own, diagnosis.simulation)])
+    whole = [each for each in account.findings if each.claim.joint is None]
     if whole:
         rows.append(["robot", NOTHING, NOTHING, _found_in_words(whole, diagnosis.simulation)])
     rows = [[cell.replace("\N{NO-BREAK SPACE}", " ") for cell in row] for row in rows]
@@ -133,7 +133,7 @@ def _joint_lines(diagnosis: Diagnosis, told: Told) -> Iterator[str]:
         yield from (f"  {' ' * len(start)}{line}" for line in lines[1:])
 
 
-def _found_in_words(found: Sequence[ToldFinding], simulation: Simulation) -> str:
+def _found_in_words(found: Sequence[StatedFinding], simulation: Simulation) -> str:
     """`Coulomb and viscous friction; torque offset 0.84 N m`: friction stands beside it with its size."""
     laws = [each for each in found if each.cause == FRICTION and each.statement.kind == "name"]
     laws = [each for each in laws if not each.claim.simulated]
@@ -163,11 +163,11 @@ def _shorter(claim: Claim) -> Claim:
     return replace(claim, parameters=tuple(numbers))
 
 
-def _detail_lines(diagnosis: Diagnosis, told: Told) -> Iterator[str]:
-    for number, each in enumerate((*told.findings, *told.minor), 1):
+def _detail_lines(diagnosis: Diagnosis, account: Account) -> Iterator[str]:
+    for number, each in enumerate((*account.findings, *account.minor), 1):
         yield from _finding_lines(number, each, diagnosis.simulation)
     arm = diagnosis.simulation.arm
-    for left in told.left:
+    for left in account.left:
         depends = f", depends on {variables_in_words(arm, left.depends_on)}" if left.depends_on else ""
         usual = "" if left.usual else ", more than real arms leave"
         yield f"  left at {joint_in_words(arm, left.joint)}: {left.share_of_torque:.1%} of the torque{depends}{usual}"
@@ -207,7 +207,7 @@ def _setup_lines(number: int, finding: SetupFinding, arm: Arm) -> Iterator[str]:
         yield from (f"     {line}" for line in wrap(f"to tell: {finding.next_experiment}", LINE_WIDTH - 5))
 
 
-def _finding_lines(number: int, finding: ToldFinding, simulation: Simulation) -> Iterator[str]:
+def _finding_lines(number: int, finding: StatedFinding, simulation: Simulation) -> Iterator[str]:
     claim, arm = finding.claim, simulation.arm
     law = claim_figures(claim, simulation) if claim.effect == PAYLOAD_FACTS.id else claim.equation
     present = simulated_figures(claim)

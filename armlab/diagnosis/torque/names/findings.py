@@ -17,9 +17,9 @@ from armlab.effects.library import effect_named
 MIN_NAME_PROBABILITY = 0.9  # of a name, and of all names of a class together
 MAX_CLASS_NAMES = 3
 FRICTION = "friction"
-TOLD_SHARE = 0.95  # of the error: causes are told until they explain as much
-MAX_TOLD_CAUSES = 4
-MAX_TOLD_OF_JOINT = 2  # findings
+STATED_SHARE = 0.95  # of the error: causes are told until they explain as much
+MAX_STATED_CAUSES = 4
+MAX_STATED_OF_JOINT = 2  # findings
 ROUNDING = 1e-4  # of a held-out error: a removal that changes less changes nothing that is shown
 
 Kind = Literal["name", "class", "cause", "nothing"]
@@ -66,7 +66,7 @@ def _probability_of_friction(effect: str, names: Sequence[Member]) -> float:
 
 
 @dataclass(frozen=True)
-class ToldCause:
+class StatedCause:
     """Findings with one cause. joints: from 1, none for the whole robot. findings: their places among the claims.
 
     share: of the error above the noise.
@@ -78,14 +78,14 @@ class ToldCause:
     findings: tuple[int, ...]
 
 
-def causes_of(parts: Sequence[Part]) -> tuple[ToldCause, ...]:
+def causes_of(parts: Sequence[Part]) -> tuple[StatedCause, ...]:
     """The causes with findings, the one with the largest share first."""
     grouped: dict[str, list[Part]] = {}
     for part in parts:
         if part.claims:
             grouped.setdefault(part.cause, []).append(part)
     causes = [
-        ToldCause(
+        StatedCause(
             cause,
             tuple(sorted({part.joint for part in own if part.joint is not None})),
             float(sum(part.share for part in own)),
@@ -96,14 +96,14 @@ def causes_of(parts: Sequence[Part]) -> tuple[ToldCause, ...]:
     return tuple(sorted(causes, key=lambda each: -each.share))
 
 
-def leading_causes(causes: Sequence[ToldCause]) -> tuple[ToldCause, ...]:
+def leading_causes(causes: Sequence[StatedCause]) -> tuple[StatedCause, ...]:
     """The largest causes, until they explain nearly all; what explains less than the rest that may stay open is none.
 
     The largest leads whatever it explains.
     """
-    out, told = list[ToldCause](), 0.0
-    for each in causes[:MAX_TOLD_CAUSES]:
-        if out and (told >= TOLD_SHARE or each.share < 1 - TOLD_SHARE):
+    out, told = list[StatedCause](), 0.0
+    for each in causes[:MAX_STATED_CAUSES]:
+        if out and (told >= STATED_SHARE or each.share < 1 - STATED_SHARE):
             break
         out.append(each)
         told += each.share
@@ -161,9 +161,9 @@ def with_minor_ones(claims: Sequence[Claim], parts: Sequence[Part]) -> tuple[Cla
         if not claim.minor:
             places.setdefault((effect_named(claim.effect).where == "link", claim.joint), []).append(number)
     for numbers in places.values():
-        _mark(out, _by_weight(numbers, out)[MAX_TOLD_OF_JOINT:])
+        _mark(out, _by_weight(numbers, out)[MAX_STATED_OF_JOINT:])
     told = [each for each in causes_of(parts) if not all(out[number].minor for number in each.findings)]
-    for each in told[MAX_TOLD_CAUSES:]:
+    for each in told[MAX_STATED_CAUSES:]:
         _mark(out, each.findings)
     return tuple(out)
 

@@ -9,8 +9,8 @@ import pandas as pd
 import yaml
 
 from armlab.common.arrays import Array
-from armlab.proof.blind.field.plan import FieldPlan
-from armlab.proof.blind.field.simulate import FieldCase
+from armlab.proof.blind.field.field_plan import FieldPlan
+from armlab.proof.blind.field.field_runs import FieldCase
 from armlab.recordings.recording import Role
 
 DIGITS = 8  # of a number in a file

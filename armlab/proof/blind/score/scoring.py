@@ -20,8 +20,8 @@ from armlab.proof.blind.score.measures import (
     detection_table_by_effect,
 )
 from armlab.proof.blind.score.outcomes import list_misses
-from armlab.proof.blind.score.page import CAPTIONS, format_measure, render_page
 from armlab.proof.blind.score.rows import ScoreRows, make_rows, read_table
+from armlab.proof.blind.score.score_page import CAPTIONS, format_measure, render_page
 from armlab.proof.blind.sealed import read_checked_manifest
 
 SCORE_FILE, PAGE_FILE, MISSES_FILE = "score.json", "score.md", "misses.csv"

@@ -8,7 +8,7 @@ import pandas as pd
 from armlab.common.markdown import markdown_table
 from armlab.proof.blind.score.cases import UNKNOWN_NAME, Category
 from armlab.proof.blind.score.measures import MEASURE_TEXTS, Measure, reliability_measures, wrong_name_measures
-from armlab.proof.blind.score.page import format_measure
+from armlab.proof.blind.score.score_page import format_measure
 
 HEADING = "## Probabilities of names"
 

@@ -17,8 +17,8 @@ from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.proof.blind.score.cases import UNKNOWN_NAME
 from armlab.proof.blind.score.measures import Measure, is_right_name, reliability_measures
-from armlab.proof.blind.score.page import format_measure
 from armlab.proof.blind.score.rows import CLAIM_COLUMNS, read_table
+from armlab.proof.blind.score.score_page import format_measure
 
 LIMIT_FILE, LIMIT_SCHEMA, PAGE_FILE = "unknown_limit.json", "unknown-limit/1", "unknown.md"
 DIGITS = 4

@@ -30,7 +30,7 @@ CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
-class Finding:
+class ExampleFinding:
     """A finding whose truth is known. background: of what every case of its tier has, which is no discovery.
 
     recording: the real one that it is from; empty for a simulated one.
@@ -95,7 +95,7 @@ class LeftOut:
     loss: float
 
 
-def calibrate(findings: Sequence[Finding]) -> Calibration:
+def calibrate(findings: Sequence[ExampleFinding]) -> Calibration:
     """The weights of everything that speaks for a name, and their reliability.
 
     Raises InputError where all findings are of one case or recording, so that none can be left out.
@@ -129,7 +129,7 @@ def stated_spread(key: str) -> float:
     return EFFECT_SPREAD if key.startswith(EFFECT_PREFIX) else SPREAD
 
 
-def leave_out(findings: Sequence[Finding], narrower: float) -> LeftOut:
+def leave_out(findings: Sequence[ExampleFinding], narrower: float) -> LeftOut:
     """Leaves out each real recording and each fold of simulated cases in turn.
 
     The lapse of a group is found on the other groups, each by weights that do not know it. narrower: times the spreads.
@@ -157,7 +157,7 @@ def leave_out(findings: Sequence[Finding], narrower: float) -> LeftOut:
     return LeftOut(weights, judged, loss)
 
 
-def _groups(findings: Sequence[Finding]) -> tuple[Hashable, ...]:
+def _groups(findings: Sequence[ExampleFinding]) -> tuple[Hashable, ...]:
     """What is left out together: a real recording, or every fifth simulated case."""
     cases = sorted({each.case for each in findings if not each.recording})
     folds = {case: number % FOLDS for number, case in enumerate(cases)}

@@ -14,8 +14,8 @@ from armlab.identification.identifier import Identifier
 from armlab.identification.regression import Regression, cutoff_of, regression, signals_of
 from armlab.identification.selection import counterbalance_groups
 from armlab.proof.open.conditioning.criteria import window_criteria
-from armlab.proof.open.conditioning.windows import BLOCKS, Windows, block_rows
-from armlab.proof.open.real_identification.study import Recipe
+from armlab.proof.open.conditioning.windows import BLOCKS, RunWindows, block_rows
+from armlab.proof.open.real_identification.identify_recording import Recipe
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
 
@@ -31,7 +31,7 @@ class ArmWindows:
     validate. simulated: (windows, simulations), the same of the known model. window_s: the length of a window, s.
     """
 
-    windows: Windows
+    windows: RunWindows
     window_s: float
     criteria: pd.DataFrame
     errors: Array
@@ -106,7 +106,7 @@ def study_arm(recipe: Recipe, recording: Recording, simulations: int = SIMULATIO
     to_predict = np.column_stack([judged.torque, simulated_torques(judged, fitted, simulations, rng)])
     target = JudgedTorque.of(judged.matrix, to_predict)
     lengths = tuple(
-        _study_windows(Windows(chosen), data, torques, len(structure.base), target) for chosen in WINDOW_BLOCKS
+        _study_windows(RunWindows(chosen), data, torques, len(structure.base), target) for chosen in WINDOW_BLOCKS
     )
     whole = float(target.percent(least_squares(data.matrix, torques))[0])
     return ConditioningStudy(
@@ -132,7 +132,9 @@ def simulated_torques(data: Regression, values: Array, simulations: int, rng: np
     return np.asarray((data.matrix @ values)[:, None] + noise.reshape(simulations, -1).T)
 
 
-def _study_windows(windows: Windows, data: Regression, torques: Array, base: int, target: JudgedTorque) -> ArmWindows:
+def _study_windows(
+    windows: RunWindows, data: Regression, torques: Array, base: int, target: JudgedTorque
+) -> ArmWindows:
     blocks = [_compress(data.matrix[rows], torques[rows]) for rows in block_rows(data.samples, data.joints)]
     errors, criteria = np.empty((len(windows), torques.shape[1])), []
     for number, members in enumerate(windows.members):

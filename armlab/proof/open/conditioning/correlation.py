@@ -8,7 +8,7 @@ from scipy.stats import t as student
 
 from armlab.common.arrays import Array
 from armlab.common.statistics import spearman_correlations, standard_ranks
-from armlab.proof.open.conditioning.windows import Windows
+from armlab.proof.open.conditioning.windows import RunWindows
 
 PERMUTATIONS = 4999
 LEVEL = 0.95
@@ -31,7 +31,7 @@ class BlockCorrelation:
     permuted: Array
 
 
-def correlate(windows: Windows, criteria: Array, errors: Array, rng: np.random.Generator) -> BlockCorrelation:
+def correlate(windows: RunWindows, criteria: Array, errors: Array, rng: np.random.Generator) -> BlockCorrelation:
     """Correlations over all windows of criteria (windows, criteria) with errors (windows,).
 
     p: the share of permutations of the blocks that give a correlation at least as large in size, the data included.
@@ -61,7 +61,7 @@ def correlate(windows: Windows, criteria: Array, errors: Array, rng: np.random.G
     )
 
 
-def average(correlations: Sequence[BlockCorrelation], windows: Windows) -> BlockCorrelation:
+def average(correlations: Sequence[BlockCorrelation], windows: RunWindows) -> BlockCorrelation:
     """The mean over arms, whose blocks are permuted independently; an arm without a value takes no part.
 
     The interval holds for the mean of these arms, not for arms in general. NaN where no arm has a value.

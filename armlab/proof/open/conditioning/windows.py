@@ -18,7 +18,7 @@ BLOCKS = 12
 
 
 @dataclass(frozen=True)
-class Windows:
+class RunWindows:
     """All windows of `chosen` out of `blocks` blocks, in lexical order."""
 
     chosen: int

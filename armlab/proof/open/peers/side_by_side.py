@@ -21,8 +21,8 @@ from armlab.identification.structure import Structure
 from armlab.identification.torque_model import TorqueModel
 from armlab.identification.validation import relative_percent
 from armlab.proof.open.peers.exchange import PeerRun, write_runs
+from armlab.proof.open.real_identification.identify_recording import Study
 from armlab.proof.open.real_identification.looks import Looks
-from armlab.proof.open.real_identification.study import Study
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.filters import LowPass
 from problem.arm import Arm, Joint, Link

@@ -18,7 +18,7 @@ from armlab.effects.transmission import BACKLASH
 from armlab.identification.identifier import Identifier
 from armlab.proof.open.real_arms.direct_reading import DirectLevel, direct_levels
 from armlab.proof.open.real_arms.judged_run import joint_rms
-from armlab.proof.open.real_arms.study import ArmStudy
+from armlab.proof.open.real_arms.one_arm import ArmStudy
 from armlab.proof.open.real_identification.published import compare_with_published, fit_published_structure
 from armlab.recordings.recording import Recording
 from armlab.report.words import effect_in_words, format_probability, joint_unit, parameter_rows

@@ -22,9 +22,9 @@ from armlab.diagnosis.settings import Settings, vary
 from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.diagnosis.torque.predict.found_model import model_found
 from armlab.diagnosis.tuning import find_number
-from armlab.proof.open.real_arms.bench import chosen_recipes
+from armlab.proof.open.real_arms.all_arms import chosen_recipes
 from armlab.proof.open.real_arms.judged_run import Percent, common_cutoff, judged_run
-from armlab.proof.open.real_arms.study import Progress, progress_under
+from armlab.proof.open.real_arms.one_arm import Progress, progress_under
 from armlab.proof.open.real_identification.looks import LOOKS_FILE, Looks
 from armlab.proof.open.stored import code_digest, recording_digest
 from armlab.recordings.public import open_public_recording

@@ -18,7 +18,7 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.common.settings import read_json, suggest_name
 from armlab.proof.open.real_concealed.claims import DrawnVerdict, judge_drawn
-from armlab.proof.open.real_concealed.conceal import Reference, SoughtEffect, identify_reference
+from armlab.proof.open.real_concealed.conceal import ReferenceModel, SoughtEffect, identify_reference
 from armlab.proof.open.real_concealed.draw import DrawnCase, draw_cases
 from armlab.proof.open.real_concealed.examine import (
     OUTCOME_ADAPTER,
@@ -28,12 +28,12 @@ from armlab.proof.open.real_concealed.examine import (
     open_outcomes,
     sought_in_case,
 )
+from armlab.proof.open.real_concealed.fixed_plan import Case
 from armlab.proof.open.real_concealed.labels import LabelledFinding, label_weighed
 from armlab.proof.open.real_concealed.observation import read_observation, write_observation
-from armlab.proof.open.real_concealed.plan import Case
 from armlab.proof.open.real_concealed.report import OUTCOMES_FOLDER, finding_in_words, list_findings
+from armlab.proof.open.real_identification.identify_recording import recipe_named
 from armlab.proof.open.real_identification.looks import LOOKS_FILE, Looks
-from armlab.proof.open.real_identification.study import recipe_named
 from armlab.recordings.public import open_public_recording
 
 REAL_ARMS = ("emps", "staubli-tx40", "unisa-ur10", "unisa-panda", "kuka-kr300")
@@ -148,7 +148,7 @@ def make_cases(
                 looks.note(reference.recording.arm.name, run.name, f"concealed: {each.case.name}")
 
 
-def write_random_case(reference: Reference, number: int, drawn: DrawnCase, folder: Path) -> None:
+def write_random_case(reference: ReferenceModel, number: int, drawn: DrawnCase, folder: Path) -> None:
     """Writes the observation and the answer of a case, the answer last."""
     key = f"{drawn.case.recording}-{number}"
     for part in (OBSERVATIONS, TRUTH):

@@ -8,7 +8,7 @@ from armlab.effects.library import EFFECT_IDS, effect_named
 from armlab.proof.open.real_concealed.conceal import SoughtEffect
 from armlab.proof.open.real_concealed.draw import DrawnCase
 from armlab.proof.open.real_concealed.examine import ExaminedCase, ReportedFinding
-from armlab.proof.open.real_concealed.judge import Findings, Judge, is_same_kind
+from armlab.proof.open.real_concealed.judge import BesideControl, Findings, is_same_kind
 
 ClaimVerdict = Literal["right", "class", "law", "unknown", "wrong"]
 SoughtAnswer = Literal["named", "class", "law", "cancelled", "absorbed", "unknown", "another name", "missed"]
@@ -59,21 +59,21 @@ def judge_drawn(
     drawn: DrawnCase, outcome: ExaminedCase, wanted: tuple[SoughtEffect, ...], control: ExaminedCase, joints: int
 ) -> DrawnVerdict:
     """Judges a case. wanted: what is concealed. joints: of the arm."""
-    judge = Judge(control, joints)
+    judge = BesideControl(control, joints)
     new = tuple(each for each in outcome.findings if _is_new(judge, each, wanted))
     claims = tuple(_judged_claim(judge, each, wanted) for each in new)
     parts = tuple(AnsweredPart(each, _answer(judge, each, outcome.findings, claims)) for each in wanted)
     return DrawnVerdict(drawn, outcome, claims, parts)
 
 
-def _is_new(judge: Judge, finding: ReportedFinding, wanted: tuple[SoughtEffect, ...]) -> bool:
+def _is_new(judge: BesideControl, finding: ReportedFinding, wanted: tuple[SoughtEffect, ...]) -> bool:
     """Whether the control does not name the effect there; of what is sought, whether it does not name that size."""
     if any(judge.answers(finding, each) or is_same_kind(finding, each) for each in wanted):
         return not judge.is_in_control(finding)
     return not judge.findings_in_control(finding)
 
 
-def _judged_claim(judge: Judge, finding: ReportedFinding, wanted: tuple[SoughtEffect, ...]) -> JudgedClaim:
+def _judged_claim(judge: BesideControl, finding: ReportedFinding, wanted: tuple[SoughtEffect, ...]) -> JudgedClaim:
     size, chance = len(_class_names(judge, finding)), finding.probability
     own = judge.common_key(finding.effect, finding.joints)
     alike = [each for each in finding.members if judge.common_key(each.effect, each.joints) == own]
@@ -82,7 +82,7 @@ def _judged_claim(judge: Judge, finding: ReportedFinding, wanted: tuple[SoughtEf
     return JudgedClaim(finding, _claim_verdict(judge, finding, wanted), size, chance)
 
 
-def _claim_verdict(judge: Judge, finding: ReportedFinding, wanted: tuple[SoughtEffect, ...]) -> ClaimVerdict:
+def _claim_verdict(judge: BesideControl, finding: ReportedFinding, wanted: tuple[SoughtEffect, ...]) -> ClaimVerdict:
     """The verdict on one new claim."""
     if finding.effect == UNKNOWN.id:
         return "unknown"
@@ -93,7 +93,7 @@ def _claim_verdict(judge: Judge, finding: ReportedFinding, wanted: tuple[SoughtE
     return "class" if any(_is_in_class(judge, finding, each) for each in wanted) else "wrong"
 
 
-def _class_names(judge: Judge, finding: ReportedFinding) -> set[Name]:
+def _class_names(judge: BesideControl, finding: ReportedFinding) -> set[Name]:
     """The names that a finding leaves open, its own included; those that nothing separates count once."""
     if finding.effect == UNKNOWN.id:
         return {(UNKNOWN.id, finding.joints)}
@@ -103,13 +103,15 @@ def _class_names(judge: Judge, finding: ReportedFinding) -> set[Name]:
     return {judge.common_key(*each) for each in names}
 
 
-def _is_in_class(judge: Judge, finding: ReportedFinding, sought: SoughtEffect) -> bool:
+def _is_in_class(judge: BesideControl, finding: ReportedFinding, sought: SoughtEffect) -> bool:
     """Whether a class of four names at most holds one that is sought, at the place."""
     names = _class_names(judge, finding)
     return len(names) <= MAX_CLASS_SIZE and not names.isdisjoint(judge.common_keys(sought))
 
 
-def _answer(judge: Judge, sought: SoughtEffect, findings: Findings, claims: tuple[JudgedClaim, ...]) -> SoughtAnswer:
+def _answer(
+    judge: BesideControl, sought: SoughtEffect, findings: Findings, claims: tuple[JudgedClaim, ...]
+) -> SoughtAnswer:
     """The best answer of the new claims to one thing. findings: all of the case."""
     names = [each.finding for each in claims if each.verdict != "unknown"]
     if any(judge.answers(each, sought) for each in names):
@@ -132,7 +134,7 @@ def _answer(judge: Judge, sought: SoughtEffect, findings: Findings, claims: tupl
 MORE_PARTS = {"asymmetric_friction": ("torque_offset",)}  # Coulomb friction that differs by direction, and an offset
 
 
-def _absorbs(judge: Judge, finding: ReportedFinding, sought: SoughtEffect) -> bool:
+def _absorbs(judge: BesideControl, finding: ReportedFinding, sought: SoughtEffect) -> bool:
     """Whether the law of a finding holds what is sought as a part, and the control names it with other numbers."""
     if finding.joints != sought.joints or finding.effect not in EFFECT_IDS or not judge.findings_in_control(finding):
         return False

@@ -14,8 +14,8 @@ from armlab.effects.parameters import ParameterValue
 from armlab.identification.identifier import Identifier
 from armlab.identification.selection import Groups, components_of, describe_choice, select_structure
 from armlab.identification.torque_model import TorqueModel
-from armlab.proof.open.real_concealed.plan import Disturbance, Piece, PieceKind
-from armlab.proof.open.real_identification.study import Recipe
+from armlab.proof.open.real_concealed.fixed_plan import Disturbance, Piece, PieceKind
+from armlab.proof.open.real_identification.identify_recording import Recipe
 from armlab.recordings.differentiate import differentiate, resample_evenly
 from armlab.recordings.recording import Recording, Run
 from problem.arm import Arm
@@ -28,7 +28,7 @@ MIXED_LAWS = ("direction", "cube root", "square", "load")
 
 
 @dataclass(frozen=True, eq=False)
-class Reference:
+class ReferenceModel:
     """A recording and its complete model. description: how the model was chosen, in a line."""
 
     recording: Recording
@@ -36,7 +36,7 @@ class Reference:
     description: str
 
 
-def identify_reference(recording: Recording, recipe: Recipe) -> Reference:
+def identify_reference(recording: Recording, recipe: Recipe) -> ReferenceModel:
     """Components, filters and prior by blocked cross-validation; links are bodies that can exist.
 
     The diagnosis measures errors of links in the metric of their pseudo-inertias, so it needs links, not base
@@ -48,7 +48,7 @@ def identify_reference(recording: Recording, recipe: Recipe) -> Reference:
     filters = choice.cutoff_hz, recording.robot, choice.position_factor
     components = components_of(groups, choice.groups)
     model = Identifier(arm, components, "physical", choice.pull, *filters).fit(runs).model_
-    return Reference(recording, model, describe_choice(choice))
+    return ReferenceModel(recording, model, describe_choice(choice))
 
 
 LAWS_BY_KIND: dict[PieceKind, tuple[str, ...]] = {

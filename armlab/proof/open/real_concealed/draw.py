@@ -17,12 +17,12 @@ from armlab.effects.contract import UNITS
 from armlab.proof.open.real_concealed.conceal import (
     LATE_KINDS,
     LAWS_BY_KIND,
-    Reference,
+    ReferenceModel,
     add_disturbance,
     withhold_pieces,
 )
-from armlab.proof.open.real_concealed.plan import Case, Disturbance, DisturbanceKind, Piece, PieceKind
-from armlab.proof.open.real_identification.study import recipe_named
+from armlab.proof.open.real_concealed.fixed_plan import Case, Disturbance, DisturbanceKind, Piece, PieceKind
+from armlab.proof.open.real_identification.identify_recording import recipe_named
 from armlab.recordings.differentiate import Signals
 from problem.arm import Arm
 
@@ -61,7 +61,7 @@ class DrawnCase:
 class StrengthGauge:
     """A reference model on its identification runs. error: RMS of each joint, (joints,), N m (N)."""
 
-    reference: Reference
+    reference: ReferenceModel
     signals: tuple[Signals, ...]
     error: Array
 
@@ -97,7 +97,7 @@ class StrengthGauge:
         return np.asarray(own.filter(added))
 
 
-def make_gauge(reference: Reference) -> StrengthGauge:
+def make_gauge(reference: ReferenceModel) -> StrengthGauge:
     """What measures the strength of the cases of a reference."""
     model = reference.model
     signals = tuple(model.signals(run) for run in reference.recording.with_role("identify"))
@@ -108,7 +108,7 @@ def _rms(torques: Sequence[Array]) -> Array:
     return np.asarray(np.sqrt(np.mean(np.concatenate(torques) ** 2, axis=0)))
 
 
-def draw_cases(reference: Reference, seed: int, number: int) -> tuple[DrawnCase, ...]:
+def draw_cases(reference: ReferenceModel, seed: int, number: int) -> tuple[DrawnCase, ...]:
     """The first random cases of a recording.
 
     Each kind that makes sense for the arm comes once before any comes twice; a part of the reference is withheld once
@@ -130,7 +130,9 @@ def draw_cases(reference: Reference, seed: int, number: int) -> tuple[DrawnCase,
     return tuple(drawn)
 
 
-def _draw_piece(rng: np.random.Generator, reference: Reference, kind: Piece, used: Collection[Case]) -> Case | None:
+def _draw_piece(
+    rng: np.random.Generator, reference: ReferenceModel, kind: Piece, used: Collection[Case]
+) -> Case | None:
     """One part of the reference that is still there in all cases; None without any.
 
     Friction and a counterbalance are those of one joint. A load is known where the recipe of the recording has one.

@@ -23,14 +23,14 @@ from armlab.diagnosis.torque.rows.data import Observed, rows_in
 from armlab.identification.model_file import write_model
 from armlab.identification.torque_model import TorqueModel
 from armlab.proof.open.real_concealed.conceal import (
-    Reference,
+    ReferenceModel,
     SoughtEffect,
     add_disturbance,
     sought_of_disturbance,
     sought_of_pieces,
     withhold_pieces,
 )
-from armlab.proof.open.real_concealed.plan import Case
+from armlab.proof.open.real_concealed.fixed_plan import Case
 from armlab.proof.open.real_identification.looks import Looks
 from armlab.proof.open.stored import code_digest, recording_digest
 from armlab.recordings.reading.answer import SetupFinding
@@ -146,7 +146,7 @@ def joints_of(joint: int | None, joints: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def examine_stored(
-    reference: Reference, case: Case, stored: "OutcomeStore", looks: Looks, progress: Callable[[str], None]
+    reference: ReferenceModel, case: Case, stored: "OutcomeStore", looks: Looks, progress: Callable[[str], None]
 ) -> ExaminedCase:
     """The stored outcome of a case, or a new one, whose looks at validation runs are logged first."""
     outcome = stored.read(case, reference.recording)
@@ -159,7 +159,7 @@ def examine_stored(
     return outcome
 
 
-def examine_case(reference: Reference, case: Case, path: Path, progress: Callable[[str], None]) -> ExaminedCase:
+def examine_case(reference: ReferenceModel, case: Case, path: Path, progress: Callable[[str], None]) -> ExaminedCase:
     """The outcome of a case. path: where the simulation that is handed over is written."""
     seen, added = conceal_case(reference, case, path)
     diagnosis, outcome = diagnose_concealed(seen, case.recording, progress)
@@ -172,7 +172,7 @@ def examine_case(reference: Reference, case: Case, path: Path, progress: Callabl
     return _measure_outcome(outcome, diagnosis, hidden, sought_in_case(reference, case))
 
 
-def conceal_case(reference: Reference, case: Case, path: Path) -> tuple[Recording, dict[str, TimedTorque] | None]:
+def conceal_case(reference: ReferenceModel, case: Case, path: Path) -> tuple[Recording, dict[str, TimedTorque] | None]:
     """The recording that a diagnosis gets, and the torque that was added to each run by its name.
 
     path: where the simulation that is handed over is written. The torque is None where parts of it are withheld.
@@ -199,7 +199,7 @@ def diagnose_concealed(seen: Recording, source: str, progress: Callable[[str], N
     return diagnosis, ExaminedCase(seen.name, findings, (), (), (), (), None, diagnosis.seconds, *said)
 
 
-def sought_in_case(reference: Reference, case: Case) -> tuple[SoughtEffect, ...]:
+def sought_in_case(reference: ReferenceModel, case: Case) -> tuple[SoughtEffect, ...]:
     """What should be named."""
     if case.injected is not None:
         return (sought_of_disturbance(case.injected, reference.recording.arm),)

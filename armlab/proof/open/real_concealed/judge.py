@@ -13,7 +13,7 @@ from armlab.proof.open.real_concealed.conceal import (
     SoughtEffect,
 )
 from armlab.proof.open.real_concealed.examine import ExaminedCase, ParameterSize, ReportedFinding, Span
-from armlab.proof.open.real_concealed.plan import Case
+from armlab.proof.open.real_concealed.fixed_plan import Case
 
 Answer = Literal["named", "identical", "law", "class", "cancelled", "elsewhere", "missed"]
 Findings = tuple[ReportedFinding, ...]
@@ -80,7 +80,7 @@ def judge_case(
     for each in (outcome, control):
         if each.refused:
             raise InputError(f"{case.recording}, {each.case}: {each.refused}")
-    judge = Judge(control, len(outcome.given))
+    judge = BesideControl(control, len(outcome.given))
     new = tuple(each for each in outcome.findings if not judge.is_in_control(each))
     unsought = tuple(each for each in new if not any(judge.answers(each, one) for one in wanted))
     parts = tuple(judge.judge_part(each, outcome.findings, new, unsought) for each in wanted)
@@ -96,7 +96,7 @@ def judge_case(
 
 
 @dataclass(frozen=True)
-class Judge:
+class BesideControl:
     """What a finding means beside the control. joints: of the arm."""
 
     control: ExaminedCase

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from armlab.diagnosis.result import WeighedName
 from armlab.proof.open.real_concealed.conceal import SoughtEffect
 from armlab.proof.open.real_concealed.examine import ExaminedCase, ReportedFinding, joints_of
-from armlab.proof.open.real_concealed.judge import Judge, is_same_kind
+from armlab.proof.open.real_concealed.judge import BesideControl, is_same_kind
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ def label_weighed(
     A name is right where it is sought; another law of friction is, where friction is withheld. None of the names is
     right where nothing of the kind is concealed, though the arm itself may have it.
     """
-    judge = Judge(control, joints)
+    judge = BesideControl(control, joints)
     for weighed in outcome.weighed:
         sought = [not each.is_none and _is_sought(judge, each, wanted) for each in weighed]
         background = not sought[0] and _is_in_control(judge, weighed[0])
@@ -41,12 +41,12 @@ def label_weighed(
         yield LabelledFinding(tuple(dict(each.numbers) for each in weighed), tuple(right), background)
 
 
-def _is_sought(judge: Judge, name: WeighedName, wanted: tuple[SoughtEffect, ...]) -> bool:
+def _is_sought(judge: BesideControl, name: WeighedName, wanted: tuple[SoughtEffect, ...]) -> bool:
     finding = _as_finding(name)
     return any(judge.answers(finding, each) or is_same_kind(finding, each) for each in wanted)
 
 
-def _is_in_control(judge: Judge, name: WeighedName) -> bool:
+def _is_in_control(judge: BesideControl, name: WeighedName) -> bool:
     return not name.is_none and bool(judge.findings_in_control(_as_finding(name)))
 
 

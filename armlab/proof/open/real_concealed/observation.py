@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from pydantic import TypeAdapter
 
-from armlab.proof.open.real_concealed.conceal import Reference
+from armlab.proof.open.real_concealed.conceal import ReferenceModel
 from armlab.proof.open.real_concealed.examine import conceal_case
-from armlab.proof.open.real_concealed.plan import Case
+from armlab.proof.open.real_concealed.fixed_plan import Case
 from armlab.recordings.load import open_recording
 from armlab.recordings.recording import Finding, Recording, Role, Run
 from armlab.recordings.recording_file import read_recording_file
@@ -42,7 +42,7 @@ class _Notes:
     runs: tuple[_RunNote, ...]
 
 
-def write_observation(reference: Reference, case: Case, folder: Path) -> None:
+def write_observation(reference: ReferenceModel, case: Case, folder: Path) -> None:
     """Writes the observation of a case into a new folder; one that is there is replaced."""
     public = reference.recording.folder
     answers = [entry.file for entry in read_recording_file(public).runs]

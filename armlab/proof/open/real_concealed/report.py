@@ -20,10 +20,10 @@ from armlab.common.report.wording import format_number, format_unit
 from armlab.common.settings import suggest_name
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import EFFECT_IDS, effect_named
+from armlab.proof.open.real_concealed.cases_of_recording import ConcealedStudy, study_recording
 from armlab.proof.open.real_concealed.examine import ExaminedCase, ReportedFinding, open_outcomes
+from armlab.proof.open.real_concealed.fixed_plan import INJECTED
 from armlab.proof.open.real_concealed.judge import Answer, CaseVerdict, ComparedNumber, JudgedPart
-from armlab.proof.open.real_concealed.plan import INJECTED
-from armlab.proof.open.real_concealed.study import ConcealedStudy, study_recording
 from armlab.proof.open.real_identification.looks import LOOKS_FILE, Looks
 from armlab.recordings.reading.words import NAMES as MISTAKE_NAMES
 from armlab.report.words import effect_in_words

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from armlab.diagnosis.formats import FindingEntry, VerdictFile
 from armlab.effects.library import effect_named
-from armlab.proof.open.real_folders.told import SETUP
+from armlab.proof.open.real_folders.stated_names import SETUP
 
 MAX_SENTENCES, MAX_WORDS, MAX_CAUSES, MAX_OF_JOINT = 3, 70, 4, 2
 ROUNDING = 1e-6  # of shares and errors that are added up again

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
-from armlab.proof.open.real_arms.bench import bench_real_arms
-from armlab.proof.open.real_folders.bench import FolderBench, bench_folders
-from armlab.proof.open.real_identification.study import RECIPES
+from armlab.proof.open.real_arms.all_arms import bench_real_arms
+from armlab.proof.open.real_folders.all_folders import FolderBench, bench_folders
+from armlab.proof.open.real_identification.identify_recording import RECIPES
 from armlab.recordings.public import LOCAL_COPIES_VARIABLE
 
 

@@ -25,7 +25,7 @@ from armlab.proof.open.likeness.real_arms import RealFolder
 from armlab.recordings.load import load_recording
 from armlab.recordings.motion import is_motion_only
 from armlab.recordings.reading.answer import read_rightly
-from armlab.recordings.reading.judge import Judge, Trial
+from armlab.recordings.reading.judge import ReadingJudge, Trial
 from armlab.recordings.reading.reading import SPRING, read_as_is
 from armlab.recordings.reading.singles import search_singles
 from armlab.recordings.reading.tuning import BOUND_FILE, BOUND_SCHEMA, ReadingTuning
@@ -71,7 +71,7 @@ def best_wrong_readings(folders: Sequence[RealFolder], tuning: ReadingTuning) ->
     """The best wrong reading of each recording with torque that is compared with links, and can be judged."""
     for folder in folders:
         recording = _recording(folder)
-        judge = None if recording is None else Judge.of(recording, tuning)
+        judge = None if recording is None else ReadingJudge.of(recording, tuning)
         if recording is not None and judge is not None:
             yield _best_wrong_reading(folder, recording, judge)
 
@@ -86,7 +86,7 @@ def _recording(folder: RealFolder) -> Recording | None:
     return None if read_simulation(recording, None).kind == "simulated" else recording
 
 
-def _best_wrong_reading(folder: RealFolder, recording: Recording, judge: Judge) -> WrongReading:
+def _best_wrong_reading(folder: RealFolder, recording: Recording, judge: ReadingJudge) -> WrongReading:
     start = judge.trial(read_as_is(recording, read_simulation(recording, None).inertial))
     tried = [each for each in search_singles(judge, start) if each.reading.mistakes[-1].effect != SPRING]
     falling = [each for each in tried[:JUDGED] if judge.may_explain(start, each, each.reading.mistakes[-1], 0.0)]
@@ -99,7 +99,7 @@ def _best_wrong_reading(folder: RealFolder, recording: Recording, judge: Judge) 
     return WrongReading(folder, best.reading.mistakes[-1].label, evidence, tuple(mistakes))
 
 
-def _is_seen(judge: Judge, wrong: Trial, right: Trial) -> bool:
+def _is_seen(judge: ReadingJudge, wrong: Trial, right: Trial) -> bool:
     """Whether a mistake makes the error of a joint so much larger than it is, or than what is usual."""
     pairs = zip(judge.errors(wrong.reading), judge.errors(right.reading), strict=True)
     usual = judge.tuning.usual_error

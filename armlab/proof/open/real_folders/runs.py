@@ -14,7 +14,7 @@ from joblib import Parallel, delayed
 from armlab.common.files import write_whole
 from armlab.common.processes import measure_run
 from armlab.common.settings import read_json
-from armlab.proof.open.real_folders.folders import RecordingFolder
+from armlab.proof.open.real_folders.recording_folders import RecordingFolder
 from armlab.proof.open.stored import REPOSITORY
 
 CODE_FOLDERS = ("armlab", "problem", "algorithms")

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.proof.open.real_folders.errors import MODELS, FolderErrors, JointErrors, Ratio
-from armlab.proof.open.real_folders.folders import RecordingFolder
+from armlab.proof.open.real_folders.facts_score import FolderScore
+from armlab.proof.open.real_folders.recording_folders import RecordingFolder
 from armlab.proof.open.real_folders.runs import FolderOutcome
-from armlab.proof.open.real_folders.score import FolderScore
-from armlab.proof.open.real_folders.told import FACT_RANKS, ToldVerdict
+from armlab.proof.open.real_folders.stated_names import FACT_RANKS, ToldVerdict
 
 PAGE_NAME, TABLE_NAME, JOINTS_NAME = "folders.md", "folders.csv", "folders_joints.csv"
 FOLDER_HEADINGS = (

@@ -30,7 +30,7 @@ COUPLING_TERMS = {"fvm": "coefficient", "fsm": "level", "Iam": "inertia"}
 
 
 @dataclass(frozen=True)
-class Comparison:
+class PublishedComparison:
     """One base parameter: published and found with standard errors; ratio: difference over the combined one."""
 
     name: str
@@ -45,7 +45,7 @@ class Comparison:
         return abs(self.found - self.published) / float(np.hypot(self.published_error, self.found_error))
 
 
-def compare_with_published(model: Model) -> tuple[Comparison, ...]:
+def compare_with_published(model: Model) -> tuple[PublishedComparison, ...]:
     """Every published base parameter that the model has; weighted least squares with errors in percent."""
     table = pd.read_csv(find_raw_file(PUBLIC_RECORDINGS["staubli-tx40"], PUBLISHED_TABLE), header=None)
     if model.covariance is None:
@@ -54,7 +54,9 @@ def compare_with_published(model: Model) -> tuple[Comparison, ...]:
     for name, value, percent in table[[0, 3, 4]].itertuples(index=False):
         weights = sum_weights(model, str(name))
         error = float(np.sqrt(weights @ model.covariance @ weights))
-        out.append(Comparison(str(name), value, abs(value) * percent / 100, float(weights @ model.values), error))
+        out.append(
+            PublishedComparison(str(name), value, abs(value) * percent / 100, float(weights @ model.values), error)
+        )
     return tuple(out)
 
 

@@ -1,1 +1,0 @@
-"""Which effects a planned motion can tell apart, before anyone records it."""

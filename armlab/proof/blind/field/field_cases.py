@@ -1,0 +1,105 @@
+"""The folders of a field case and its answer: observation, or `old` and `new` below it, and truth."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+
+from armlab.common.errors import DataError, InputError
+from armlab.proof.blind.field.field_hidden import (
+    FIELD_CHANGES,
+    FieldEffect,
+    draw_field_change,
+    draw_field_effect,
+    hidden_names,
+)
+from armlab.proof.blind.field.field_plan import FieldPlan, new_side
+from armlab.proof.blind.field.field_runs import simulate_field
+from armlab.proof.blind.field.field_sizes import draw_sized
+from armlab.proof.blind.field.field_truth import FieldTruth, make_field_truth
+from armlab.proof.blind.field.files import write_field_observation
+from armlab.proof.blind.plan import random_stream
+from armlab.proof.blind.setup.mistakes import EFFECTS, draw_mistake, inject
+from armlab.proof.blind.setup.setup_oracle import can_be_seen
+from armlab.recordings.load import load_recording
+
+SIDES = ("old", "new")
+MISTAKE_DRAWS = 10
+
+
+def make_field_case(plan: FieldPlan, observation: Path, truth: Path) -> FieldTruth:
+    """Writes the observation and the answer of a plan; returns the answer."""
+    if plan.kind.startswith("pair"):
+        answer = _make_pair(plan, observation)
+    elif plan.kind == "mistake":
+        answer = _make_mistake(plan, observation)
+    else:
+        answer = _make_single(plan, observation)
+    truth.write_text(json.dumps(answer.model_dump(mode="json", by_alias=True), indent=1) + "\n", encoding="utf-8")
+    return answer
+
+
+def _make_single(plan: FieldPlan, observation: Path) -> FieldTruth:
+    case = simulate_field(plan)
+    if plan.kind == "null":
+        write_field_observation(case, observation)
+        return make_field_truth(case)
+
+    def draw(rng: np.random.Generator, number: int) -> FieldEffect | None:
+        return draw_field_effect(rng, plan, _cycled(plan, "effects", hidden_names(), number))
+
+    effect, strength = draw_sized(plan, case, draw)
+    write_field_observation(simulate_field(plan, (effect,), case.rest_factors), observation)
+    return make_field_truth(case, hidden=(effect, strength))
+
+
+def _make_mistake(plan: FieldPlan, observation: Path) -> FieldTruth:
+    """A recording with one mistake that can be seen, if one of some draws can."""
+    case = simulate_field(plan)
+    right = observation.with_name("right")
+    write_field_observation(case, right)
+    recording, rng = load_recording(right), plan.stream("mistake")
+    for number in range(MISTAKE_DRAWS):
+        drawn = draw_mistake(rng, _cycled(plan, "mistakes", EFFECTS, number), recording.arm)
+        if drawn is None:
+            continue
+        shutil.rmtree(observation, ignore_errors=True)
+        shutil.copytree(right, observation)
+        inject(observation, (drawn,), case.arm)
+        made, seen = drawn, _is_seen(right, observation)
+        if seen:
+            break
+    shutil.rmtree(right)
+    return make_field_truth(case, mistakes=((made, seen),))
+
+
+def _make_pair(plan: FieldPlan, observation: Path) -> FieldTruth:
+    old = simulate_field(plan)
+    later = new_side(plan)
+    new = simulate_field(later, rest_factors=old.rest_factors)
+    write_field_observation(old, observation / SIDES[0])
+    if plan.kind == "pair null":
+        write_field_observation(new, observation / SIDES[1])
+        return make_field_truth(old)
+
+    def draw(rng: np.random.Generator, number: int) -> FieldEffect:
+        kind = FIELD_CHANGES[(plan.index + number // 3) % len(FIELD_CHANGES)]  # another one where it cannot be seen
+        return draw_field_change(rng, later, kind)
+
+    change, strength = draw_sized(later, new, draw, beside=old)
+    write_field_observation(simulate_field(later, (change,), old.rest_factors), observation / SIDES[1])
+    return make_field_truth(old, change=(change, strength))
+
+
+def _cycled(plan: FieldPlan, what: str, names: tuple[str, ...], attempt: int) -> str:
+    """Each name comes once in a set before any comes twice; another one at a further attempt."""
+    order: list[int] = random_stream("field order", what, plan.seed).permutation(len(names)).tolist()
+    return names[order[(plan.index + 5 * attempt) % len(names)]]
+
+
+def _is_seen(right: Path, wrong: Path) -> bool:
+    try:
+        return can_be_seen(load_recording(right), load_recording(wrong))
+    except (InputError, DataError):
+        return True  # a recording that cannot even be read is seen to be wrong

@@ -1,0 +1,246 @@
+"""The verdict in three sentences: where the error comes from, how large that is, and what is gained and left."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from armlab.common.report.wording import count_of, format_number, join_words
+from armlab.diagnosis.result import Diagnosis, JointFit
+from armlab.diagnosis.torque.names.findings import FRICTION, STATED_SHARE, StatedCause
+from armlab.diagnosis.torque.predict.parts import LINKS, UNKNOWN_CAUSE
+from armlab.effects.library import effect_named
+from armlab.effects.links import PAYLOAD_FACTS
+from armlab.effects.words import place_in_words
+from armlab.identification.torque_model import TorqueModel
+from armlab.report.account.account import Account, StatedFinding, account_of
+from armlab.report.torque.sentences import claim_figures, model_in_words
+from armlab.report.words import (
+    LINKS_IN_WORDS,
+    claim_name,
+    compared_in_words,
+    effect_in_words,
+    format_fixed,
+    is_negative_load,
+    is_of_unknown_links,
+    joint_unit,
+)
+from problem.joint_words import joint_in_words, joints_in_words, links_in_words
+
+MAX_WORDS = 70  # of a summary
+MAX_FIRST_WORDS = 30  # of its first sentence
+MAX_FIGURES = 3  # in its second sentence
+
+
+def summary_of(diagnosis: Diagnosis) -> str:
+    """How the recording is to be read where that is wrong, then the physics."""
+    setup = diagnosis.setup.sentence if diagnosis.setup else ""
+    return " ".join(each for each in (setup, physics_in_words(diagnosis)) if each)
+
+
+def physics_in_words(diagnosis: Diagnosis) -> str:
+    """At most three sentences and MAX_WORDS words; of a recording without a model, why there is none."""
+    if diagnosis.unnamed is not None and diagnosis.model is not None:
+        return _describe_unnamed(diagnosis.unnamed, diagnosis.model)
+    return " ".join(sentences_of(diagnosis)) if diagnosis.fit else diagnosis.reason
+
+
+def sentences_of(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """The sentences of the summary, the most important first."""
+    account = account_of(diagnosis)
+    if not diagnosis.claims:
+        worst = max((each.after for each in diagnosis.fit), default=0.0)
+        model = model_in_words(diagnosis.simulation)
+        return (f"Nothing is missing: {model} explains the recording down to its noise (at most {worst:.3g} N m).",)
+    if not account.findings:
+        small = count_of(len(account.minor), "small difference")
+        first = f"Nothing of practical size is missing: {small} change no held-out error by 5 %."
+        return first, _rest(account, diagnosis)
+    return _Writer(diagnosis, account).sentences()
+
+
+def _rest(account: Account, diagnosis: Diagnosis) -> str:
+    """What is left at the joint where that is the largest share of its torque."""
+    worst = max(account.left, key=lambda each: each.share_of_torque)
+    arm = diagnosis.simulation.arm
+    size = f"{format_fixed(worst.rms)} {joint_unit(arm, worst.joint - 1)}"
+    usual = "as real arms leave" if worst.usual else "more than real arms leave"
+    where = f"{joint_in_words(arm, worst.joint)}, {size}"
+    return f"What is left is at most {100 * worst.share_of_torque:.0f} % of the torque ({where}), {usual}."
+
+
+@dataclass(frozen=True, eq=False)
+class _Writer:
+    diagnosis: Diagnosis
+    account: Account
+
+    def sentences(self) -> tuple[str, ...]:
+        first, last = self._where(), self._gain()
+        left = MAX_WORDS - len(first.split()) - len(last.split())
+        shown = list[str]()
+        for each in self._figures():
+            longer = [*shown, each]
+            if len(longer) > MAX_FIGURES or len("; ".join(longer).split()) > left:
+                break
+            shown = longer
+        size = "; ".join(shown)
+        return tuple(each for each in (first, f"{size[:1].upper()}{size[1:]}." if size else "", last) if each)
+
+    def _where(self) -> str:
+        """The leading causes with their shares; a share of several is never 100 %."""
+        first, *others = self.account.leading
+        most = 100 - max(round(100 * sum(each.share for each in others)), 1) if others else 100
+        share = min(round(100 * first.share), most)
+        is_alone = len(self.account.causes) > 1 and not others and share == 100
+        amount = "More than 99" if is_alone else "Less than 1" if share < 1 else str(share)
+        sentence = f"{amount} % of the error comes from {self.cause_in_words(first)}"
+        for each in others:
+            longer = f"{sentence}, {100 * each.share:.0f} % from {self.cause_in_words(each)}"
+            if len(longer.split()) > MAX_FIRST_WORDS:
+                break
+            sentence = longer
+        open_share = 1 - sum(each.share for each in self.account.causes)
+        longer = f"{sentence}; {100 * open_share:.0f} % has no sure name"
+        if open_share > 1 - STATED_SHARE and len(longer.split()) <= MAX_FIRST_WORDS:
+            sentence = longer
+        return f"{sentence}."
+
+    def cause_in_words(self, cause: StatedCause) -> str:
+        """The cause with its place: by its name where its findings have one."""
+        arm = self.diagnosis.simulation.arm
+        own = self.account.findings_of(cause)
+        joints = sorted({each.claim.joint for each in own if each.claim.joint is not None})
+        if cause.cause == LINKS:
+            name = _name_of_links(own)
+            joints = [] if all(is_of_unknown_links(each.claim) for each in own) else joints
+            return f"{name} of {links_in_words(arm, joints)}" if joints else f"{LINKS_IN_WORDS} of the links"
+        if cause.cause == UNKNOWN_CAUSE:
+            name = "something without a name"
+        elif cause.cause == FRICTION:
+            name = _name_of_friction(own)
+        else:
+            name = _name_of(own)
+        return f"{name} at {joints_in_words(arm, joints)}" if joints else name
+
+    def _figures(self) -> Iterator[str]:
+        for cause in self.account.leading:
+            yield from self._friction_figures(cause)
+            if cause.cause not in (FRICTION, UNKNOWN_CAUSE):
+                yield from self._other_figures(cause)
+
+    def _friction_figures(self, cause: StatedCause) -> Iterator[str]:
+        """Of one joint at both speeds, of several the least and the most at their higher speeds; also behind play."""
+        arm = self.diagnosis.simulation.arm
+        joints = {each.claim.joint for each in self.account.findings_of(cause) if each.is_friction}
+        rows = sorted((each for each in self.account.friction if each.joint in joints), key=lambda each: each.torque[1])
+        if not rows:
+            return
+        low, high = rows[0], rows[-1]
+        unit = joint_unit(arm, high.joint - 1)
+        if low is high:
+            speed = speed_unit(unit)
+            sizes = [
+                f"{format_number(torque)} {unit} at {format_number(at, 2)} {speed}"
+                for torque, at in zip(high.torque, high.speeds, strict=True)
+            ]
+            yield f"friction is {join_words(sizes)}"
+            return
+        yield (
+            f"friction at higher speeds is {format_number(low.torque[1])} {joint_unit(arm, low.joint - 1)} "
+            f"({joint_in_words(arm, low.joint)}) to {format_number(high.torque[1])} {unit} "
+            f"({joint_in_words(arm, high.joint)})"
+        )
+
+    def _other_figures(self, cause: StatedCause) -> Iterator[str]:
+        largest = self.account.findings_of(cause)[:1]
+        for each in largest:
+            numbers, arm = claim_figures(each.claim, self.diagnosis.simulation), self.diagnosis.simulation.arm
+            if not numbers:
+                continue
+            if each.claim.effect == PAYLOAD_FACTS.id:
+                mass = numbers.split(" at ")[0]
+                yield f"{'it lacks' if is_negative_load(each.claim) else 'the load is'} {mass}"
+                continue
+            place = place_in_words(arm, each.claim.effect, each.claim.joint, each.claim.joints)
+            name = LINKS_IN_WORDS if cause.cause == LINKS else effect_in_words(each.claim.effect)
+            yield f"{name} {'of' if cause.cause == LINKS else 'at'} {place}: {numbers}"
+
+    def _gain(self) -> str:
+        """How far the held-out error falls where it falls most, and what that leaves of the torque."""
+        fit, before = self._largest_fall()
+        arm, unit = self.diagnosis.simulation.arm, joint_unit(self.diagnosis.simulation.arm, fit.joint - 1)
+        left = next((each for each in self.account.left if each.joint == fit.joint), None)
+        share = "" if left is None else f", {100 * left.share_of_torque:.0f} % of its torque"
+        falls = "falls" if fit.after < before else "does not fall:"
+        return (
+            f"On held-out data the error of {joint_in_words(arm, fit.joint)} {falls} from {format_fixed(before)} "
+            f"({compared_in_words(self.diagnosis.simulation)}) to {format_fixed(fit.after)} {unit}{share}."
+        )
+
+    def _largest_fall(self) -> tuple[JointFit, float]:
+        """The joint of a finding at which the error falls most, and the error that it starts at."""
+        start = errors_at_start(self.diagnosis)
+        joints = {each.claim.evidence.joint for each in self.account.findings}
+        fits = [each for each in self.diagnosis.fit if each.joint - 1 in joints]
+        best = max(fits, key=lambda each: start[each.joint - 1] / max(each.after, 1e-300))
+        return best, float(start[best.joint - 1])
+
+
+def errors_at_start(diagnosis: Diagnosis) -> Sequence[float]:
+    """Held-out error of each joint, N m (N), of what is compared: the simulation as given, else the refitted links."""
+    observed, given = diagnosis.observed, diagnosis.nominal
+    if observed is None or given is None or diagnosis.simulation.kind == "refit":
+        return [each.before for each in diagnosis.fit]
+    out = []
+    for joint in range(observed.joints):
+        rows = observed.rows_held_out(joint)
+        out.append(float(np.sqrt(np.mean(given[rows, joint] ** 2))))
+    return out
+
+
+def speed_unit(torque_unit: str) -> str:
+    """`rad/s` of a joint with torque, `m/s` of one with a force."""
+    return "rad/s" if torque_unit == "N m" else "m/s"
+
+
+def _name_of_friction(own: Sequence[StatedFinding]) -> str:
+    """By its laws where all of them are sure and few: `Coulomb and viscous friction`, `too much viscous friction`."""
+    laws = list(dict.fromkeys(claim_name(each.claim) for each in own))
+    if any(each.statement.kind != "name" for each in own) or len(laws) > 2:
+        return FRICTION
+    return shorter_list(laws)
+
+
+def shorter_list(names: Sequence[str]) -> str:
+    """`Coulomb and viscous friction` of `Coulomb friction` and `viscous friction`."""
+    if len(names) > 1 and all(name.endswith(f" {FRICTION}") for name in names):
+        return f"{join_words([name.removesuffix(f' {FRICTION}') for name in names])} {FRICTION}"
+    return join_words(list(names))
+
+
+def _name_of_links(own: Sequence[StatedFinding]) -> str:
+    if len(own) == 1 and own[0].claim.effect == PAYLOAD_FACTS.id and own[0].statement.kind == "name":
+        return "less mass" if is_negative_load(own[0].claim) else effect_in_words(PAYLOAD_FACTS.id)
+    return LINKS_IN_WORDS
+
+
+def _name_of(own: Sequence[StatedFinding]) -> str:
+    """Of findings with one effect: its name, the names of its class, or its name with a doubt."""
+    first = own[0].statement
+    if first.kind == "class":
+        return join_words([effect_named(each).words for each in first.effects], "or")
+    name = effect_named(first.effects[0]).words
+    behind = f" with {FRICTION}" if own[0].is_friction else ""
+    return f"{name}{behind}{' (not certain)' if first.kind == 'cause' else ''}"
+
+
+def _describe_unnamed(joint: JointFit, model: TorqueModel) -> str:
+    """What is known where a model predicts better and none of its parts is sure enough for a name."""
+    parts = [model.structure.components[index] for index in sorted(model.unclaimed)]
+    names = dict.fromkeys(effect_in_words(each.effect) for each in parts if each.joint == joint.joint)
+    here, where = join_words(list(names)) if names else "the links as fitted", joint_in_words(model.arm, joint.joint)
+    return (
+        f"Something is missing at {where}, and these data cannot name it surely: with what the model holds "
+        f"without a claim ({here}) the error on held-out data falls from {joint.before:.3g} to {joint.after:.3g}. "
+        "Record longer motion with more reversals and speeds."
+    )
