@@ -81,7 +81,7 @@ relations: .venv/dev ## relations that need no truth, on real recordings and a f
 	$(BIN)/armlab proof relations .armlab/relations-set/observations/*
 
 prove-changes: .venv/dev ## the comparison judged on pairs with nothing or one thing changed: results/proof/changes/
-	$(BIN)/armlab proof changes --results results/proof/changes
+	$(BIN)/armlab proof run --tier changes
 
 prove: .venv/dev ## hide effects, diagnose blindly, score, all judged and logged: results/proof/
 	$(BIN)/armlab proof run

@@ -43,10 +43,10 @@ MOVED = {
     "confusability": "model confusability",
     "gains": "recording gains",
     "prove": "proof run",
-    "prove-setup": "proof setup",
-    "prove-motion": "proof motion",
-    "prove-changes": "proof changes",
-    "prove-field": "proof field",
+    "prove-setup": "proof run --tier setup",
+    "prove-motion": "proof run --tier motion",
+    "prove-changes": "proof run --tier changes",
+    "prove-field": "proof run --tier field",
     "oracle": "proof oracle",
     "real": "proof real",
     "real-motion": "proof real-motion",
@@ -135,10 +135,6 @@ _NOUNS: Mapping[str, tuple[str, Sections]] = {
         {
             "Hidden effects": {
                 "run": "armlab.cli.proof:prove",
-                "setup": "armlab.cli.proof:prove_setup",
-                "motion": "armlab.cli.proof:prove_motion",
-                "changes": "armlab.cli.proof:prove_changes",
-                "field": "armlab.cli.proof:prove_field",
                 "oracle": "armlab.cli.concealed:oracle",
             },
             "Real arms": {

@@ -26,7 +26,7 @@ _PATH = click.Path(path_type=Path)
     type=_PATH,
     multiple=True,
     metavar="WORK",
-    help="Folder of `armlab proof motion --seed SEED`; may be given more than once.",
+    help="Folder `motion` of `armlab proof run --tier motion --development SEED`; may be given more than once.",
 )
 @click.option(
     "--real",

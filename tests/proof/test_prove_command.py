@@ -8,14 +8,13 @@ from typing import Any
 import pytest
 from made_verdicts import finding, verdict, write
 
-from armlab.common.errors import InputError
 from armlab.proof.blind.log_page import LOG_FILE
 from armlab.proof.blind.plan import Plan
 from armlab.proof.blind.score.measures import MEASURE_TEXTS
-from armlab.proof.blind.sealed import VERDICTS, SealedTier, judged_commit, judged_seed
+from armlab.proof.blind.sealed import VERDICTS, SealedTier
 from armlab.proof.tiers.guards import AblationSettings, ablate
-from armlab.proof.tiers.tiers import prove_tiers
-from armlab.proof.tiers.torque import Proof, SetSettings, choose_proof, prove_torque
+from armlab.proof.tiers.tiers import choose_proof, prove_tiers
+from armlab.proof.tiers.torque import SetSettings, prove_torque
 
 SETS = {"mixed": SetSettings(1, 5000, "clean", "nulls")}
 
@@ -36,9 +35,8 @@ def silent(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def test_a_judged_proof_is_logged_once_with_commit_seed_seal_and_score(silent: list[str], tmp_path: Path) -> None:
-    proof = Proof(SETS, "judged", "a" * 40)
-    said = list(prove_torque(proof, tmp_path / "work", tmp_path / "results", 1))
-    list(prove_torque(proof, tmp_path / "work", tmp_path / "results", 1))
+    said = list(prove_torque(SETS, tmp_path / "work", tmp_path / "results", 1, "a" * 40))
+    list(prove_torque(SETS, tmp_path / "work", tmp_path / "results", 1, "a" * 40))
     entries = [json.loads(line) for line in (tmp_path / "results" / LOG_FILE).read_text().splitlines()]
     assert len(entries) == 1
     assert entries[0]["commit"] == "a" * 40
@@ -59,14 +57,13 @@ def test_the_committed_log_selects_measures_by_id() -> None:
 
 def test_sets_that_are_proved_one_after_another_are_logged_each(silent: list[str], tmp_path: Path) -> None:
     for name in ("mixed", "nulls"):
-        proof = Proof({name: SETS["mixed"]}, "judged", "c" * 40)
-        list(prove_torque(proof, tmp_path / "work", tmp_path / "results", 1))
+        list(prove_torque({name: SETS["mixed"]}, tmp_path / "work", tmp_path / "results", 1, "c" * 40))
     entries = [json.loads(line) for line in (tmp_path / "results" / LOG_FILE).read_text().splitlines()]
     assert [each["set"] for each in entries] == ["mixed", "nulls"]
 
 
 def test_the_seal_is_printed_before_the_first_diagnosis(silent: list[str], tmp_path: Path) -> None:
-    steps = prove_torque(Proof(SETS, "judged", "b" * 40), tmp_path / "work", tmp_path / "results", 1)
+    steps = prove_torque(SETS, tmp_path / "work", tmp_path / "results", 1, "b" * 40)
     for line in steps:
         if "SHA-256" in line:
             break
@@ -76,26 +73,11 @@ def test_the_seal_is_printed_before_the_first_diagnosis(silent: list[str], tmp_p
 
 
 def test_a_finished_quick_proof_starts_anew_and_is_not_logged(silent: list[str], tmp_path: Path) -> None:
+    proof = choose_proof(True, None, {"cases": 1}, ())
     for _ in range(2):
-        list(prove_tiers(Proof(SETS, "quick"), ["torque"], tmp_path / "work", tmp_path / "results", 1))
+        list(prove_tiers(proof, ["torque"], tmp_path / "work", tmp_path / "results", 1))
     assert len(silent) == 2
     assert not (tmp_path / "results" / LOG_FILE).exists()
-
-
-def test_a_development_proof_has_a_development_seed_and_no_commit() -> None:
-    proof = choose_proof(False, 1200, 4, 0)
-    assert proof.commit is None
-    assert proof.sets == {"mixed": SetSettings(4, 1200, development=True)}
-    with pytest.raises(InputError, match="seed 5000 should be one for development, 1000 to 1999"):
-        choose_proof(False, 5000, 4, 0)
-
-
-def test_a_seed_that_follows_from_no_commit_judges_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    commit = "a" * 40
-    monkeypatch.setattr("armlab.proof.blind.sealed.code_commit", lambda: commit)
-    assert judged_commit(judged_seed(commit)) == commit
-    assert judged_commit(judged_seed("b" * 40)) is None
-    assert judged_commit(1200) is None
 
 
 def test_an_ablation_scores_the_same_cases_with_each_guard_off(tmp_path: Path) -> None:

@@ -286,17 +286,6 @@ def judged_seed(commit: str) -> int:
     return DEVELOPMENT_SEEDS.stop + int(commit[:12], 16)
 
 
-def judged_commit(seed: int) -> str | None:
-    """The commit of the code where a seed follows from it, None for every other seed, whose sets judge nothing."""
-    if seed in DEVELOPMENT_SEEDS:
-        return None
-    try:
-        commit = code_commit()
-    except InputError:  # no git checkout
-        return None
-    return commit if seed == judged_seed(commit) else None
-
-
 def append_to_log(path: Path, commit: str, name: str, seed: int, sealed: str, score: Score) -> None:
     """Adds a line to the log of judged runs (commit, seed, seal, each measure by its id), and writes its page."""
     entry = {

@@ -14,7 +14,7 @@ from armlab.common.markdown import markdown_page, markdown_table
 from armlab.proof.blind.score.measures import MEASURE_TEXTS
 from armlab.proof.blind.score.scoring import compute_score
 from armlab.proof.blind.sealed import FINISHED_MARK
-from armlab.proof.tiers.torque import TORQUE, make_development_proof
+from armlab.proof.tiers.torque import TORQUE, torque_sets
 
 DONE_FOLDER = "done"  # beside the verdicts: an empty file for each finished case
 GUARD_ORDER_FILE = "guards.txt"  # beside the verdicts: the guards in their order
@@ -50,9 +50,8 @@ def ablate(
     """
     if (work / FINISHED_MARK).is_file():
         shutil.rmtree(work)
-    proof = make_development_proof(settings.seed, settings.cases, settings.nulls)
     found: dict[str, dict[str, Any]] = {}
-    for name, each in proof.sets.items():
+    for name, each in torque_sets(settings.seed, settings.cases, settings.nulls).items():
         folder, verdicts = work / name, work / "verdicts" / name
         list(TORQUE.conceal(each, folder, jobs))
         sealed = TORQUE.seal(each, folder)

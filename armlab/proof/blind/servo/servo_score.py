@@ -320,7 +320,7 @@ def read_weighed_motion(work: Path) -> tuple[str, list[WeighedFinding]]:
     check_development(manifest.seed, work)
     cases = [name for name in manifest.cases if (work / VERDICTS / name).is_dir()]
     if not cases:
-        raise InputError(f"{work} holds no verdicts: `armlab proof motion --seed SEED --work {work}` makes them")
+        raise InputError(f"{work} holds no verdicts: `armlab proof run --tier motion` makes them")
     about = f"motion, seed {manifest.seed}: {len(cases)} cases"
     return about, [each for case in cases for each in _weighed_findings(work, case, manifest.seed)]
 
