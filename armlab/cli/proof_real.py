@@ -102,13 +102,13 @@ def real_motion(results: Path, recordings: Path, peer: str | None, peer_windows:
 @click.option("--results", type=OutputPath(), default=Path("results/real"), show_default=True)
 @click.option("--recordings", type=OutputPath(), default=Path(".armlab/recordings"), show_default=True)
 @click.option("--only", multiple=True, help="Name of a public recording [default: all].")
-@click.option("--seed", type=int, help="Draws random cases; 1000-1999 are for development [default: a fixed plan].")
-@click.option("--cases", type=click.IntRange(min=1), default=16, show_default=True, help="Random ones of a recording.")
-@click.option("--out", type=OutputPath(), help="Folder for the tables of random cases [default: RESULTS].")
-@click.option("--jobs", type=JobCount(), default=1, show_default=True, help="Processes for random cases.")
-@click.option("--make", "made", type=OutputPath(), help="Only write random cases: observations and answers.")
+@click.option("--seed", type=int, help="Draws the cases; 1000-1999 are for development.")
+@click.option("--cases", type=click.IntRange(min=1), default=16, show_default=True, help="Of a recording.")
+@click.option("--out", type=OutputPath(), help="Folder for the tables [default: RESULTS].")
+@click.option("--jobs", type=JobCount(), default=1, show_default=True, help="Processes.")
+@click.option("--make", "made", type=OutputPath(), help="Only write the cases: observations and answers.")
 @click.option("--observation", type=_FILE, help="Only diagnose one of these observations, into --out.")
-@click.option("--judge", "answered", type=_FILE, help="Only judge a folder of random cases that were diagnosed.")
+@click.option("--judge", "answered", type=_FILE, help="Only judge a folder of cases that were diagnosed.")
 @prints_lines
 def real_concealed(
     results: Path,
@@ -124,9 +124,8 @@ def real_concealed(
 ) -> Iterator[str]:
     """Judge diagnoses of effects concealed in real recordings.
 
-    Conceals effects in public recordings of real arms, diagnoses them, and compares. Writes concealed.md,
-    concealed.csv and concealed.svg; with --seed the tables cases.csv, claims.csv and recordings.csv, which
-    `armlab proof run --tier real` scores.
+    Conceals effects in public recordings of real arms at random, diagnoses them, and compares. Writes the tables
+    cases.csv, claims.csv and recordings.csv, which `armlab proof run --tier real` scores.
     """
     from armlab.proof.open.real_concealed.at_random import (
         REAL_ARMS,
@@ -136,7 +135,6 @@ def real_concealed(
         judge_cases,
         make_cases,
     )
-    from armlab.proof.open.real_concealed.report import conceal_in_recordings
 
     steps = [name for name, given in (("--make", made), ("--observation", observation), ("--judge", answered)) if given]
     if len(steps) > 1:
@@ -144,9 +142,7 @@ def real_concealed(
     if observation is not None:
         return examine_observation(observation, out or results, tell_progress)
     if seed is None:
-        if steps:
-            raise click.UsageError(f"{steps[0]} needs --seed, that of the random cases")
-        return conceal_in_recordings(results, recordings, only, tell_progress)
+        raise click.UsageError("--seed is needed, that of the cases")
     settings = RandomCases(only or REAL_ARMS, cases, seed)
     if made is not None:
         return make_cases(settings, recordings, results, made, tell_progress)

@@ -6,6 +6,7 @@ from armlab.diagnosis.result import Weighed, WeighedName
 from armlab.proof.open.real_concealed.at_random import RandomStudy, random_tables
 from armlab.proof.open.real_concealed.claims import DrawnVerdict, judge_drawn
 from armlab.proof.open.real_concealed.conceal import SoughtEffect
+from armlab.proof.open.real_concealed.concealed_case import Case, Disturbance
 from armlab.proof.open.real_concealed.draw import DrawnCase
 from armlab.proof.open.real_concealed.examine import (
     ExaminedCase,
@@ -14,7 +15,6 @@ from armlab.proof.open.real_concealed.examine import (
     ReportedFinding,
     RivalName,
 )
-from armlab.proof.open.real_concealed.fixed_plan import Case, Disturbance
 from armlab.proof.open.real_concealed.labels import LabelledFinding, label_weighed
 
 SPRING = SoughtEffect("spring at joint 2", ("cable_stiffness",), (2,), {}, ("gravity_compensator",))
@@ -36,7 +36,7 @@ def _judged(
     *said: ReportedFinding, sought: SoughtEffect = SPRING, control: tuple[ReportedFinding, ...] = (), joints: int = 3
 ) -> DrawnVerdict:
     def outcome(findings: tuple[ReportedFinding, ...]) -> ExaminedCase:
-        return ExaminedCase("told", findings, (1.0,), (1.0,), (1.0,), (1.0,), None, 0.1)
+        return ExaminedCase("told", findings, 0.1)
 
     return judge_drawn(CASE, outcome(said), (sought,), outcome(control), joints)
 
@@ -46,7 +46,7 @@ def _weighed(*names: str) -> Weighed:
 
 
 def _labels(*weighed: Weighed, control: tuple[ReportedFinding, ...] = ()) -> list[LabelledFinding]:
-    outcome = ExaminedCase("told", (), (1.0,), (1.0,), (1.0,), (1.0,), None, 0.1, weighed=weighed)
+    outcome = ExaminedCase("told", (), 0.1, weighed=weighed)
     return list(label_weighed(outcome, (SPRING,), replace(outcome, findings=control), 3))
 
 

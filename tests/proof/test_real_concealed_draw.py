@@ -12,6 +12,7 @@ from armlab.proof.open.real_concealed.conceal import (
     links_hold_rotor,
     sought_of_disturbance,
 )
+from armlab.proof.open.real_concealed.concealed_case import Case, Disturbance, Piece
 from armlab.proof.open.real_concealed.draw import (
     INJECTED_KINDS,
     STRENGTHS,
@@ -20,7 +21,6 @@ from armlab.proof.open.real_concealed.draw import (
     draw_cases,
     make_gauge,
 )
-from armlab.proof.open.real_concealed.fixed_plan import Case, Disturbance, Piece
 
 SEED, CASES = 1001, 16
 

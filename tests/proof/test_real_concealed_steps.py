@@ -15,8 +15,8 @@ from armlab.common.errors import InputError
 from armlab.proof.open.real_concealed import at_random
 from armlab.proof.open.real_concealed.at_random import RandomCases, conceal_at_random, judge_cases
 from armlab.proof.open.real_concealed.conceal import ReferenceModel
+from armlab.proof.open.real_concealed.concealed_case import Case, Disturbance, Piece
 from armlab.proof.open.real_concealed.examine import conceal_case
-from armlab.proof.open.real_concealed.fixed_plan import Case, Disturbance, Piece
 from armlab.proof.open.real_concealed.observation import read_observation, write_observation
 from armlab.proof.open.real_identification.looks import LOOKS_FILE
 
@@ -36,7 +36,7 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> ReferenceModel:
 def test_an_observation_is_to_the_bit_what_a_diagnosis_gets_in_memory(
     reference: ReferenceModel, case: Case, tmp_path: Path
 ) -> None:
-    wanted, _ = conceal_case(reference, case, tmp_path / "model.yaml")
+    wanted = conceal_case(reference, case, tmp_path / "model.yaml")
     write_observation(reference, case, tmp_path / "seen")
     seen, source = read_observation(tmp_path / "seen")
     assert source == "told"
@@ -89,7 +89,7 @@ def test_random_cases_are_made_diagnosed_and_judged_and_go_on_after_an_interrupt
 
 @pytest.mark.parametrize(
     ("options", "complaint"),
-    [(["--make", "a", "--judge", "b"], "give one of them"), (["--judge", "b"], "--judge needs --seed")],
+    [(["--make", "a", "--judge", "b"], "give one of them"), (["--judge", "b"], "--seed is needed")],
 )
 def test_steps_that_cannot_be_done_are_refused(options: list[str], complaint: str) -> None:
     refused = CliRunner().invoke(main, ["proof", "real-concealed", *options])

@@ -16,7 +16,7 @@ CODE_FOLDERS = (
     "armlab/identification",
     "armlab/diagnosis",
 )
-CODE_SUFFIXES = (".py", ".c", ".yaml")  # robots are YAML
+CODE_SUFFIXES = (".py", ".c", ".yaml", ".json")  # robots are YAML, learnt weights and bounds JSON
 
 
 def code_digest(*own: Path) -> str:

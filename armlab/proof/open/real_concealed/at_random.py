@@ -19,24 +19,25 @@ from armlab.common.files import write_texts
 from armlab.common.settings import read_json, suggest_name
 from armlab.proof.open.real_concealed.claims import DrawnVerdict, judge_drawn
 from armlab.proof.open.real_concealed.conceal import ReferenceModel, SoughtEffect, identify_reference
+from armlab.proof.open.real_concealed.concealed_case import Case
 from armlab.proof.open.real_concealed.draw import DrawnCase, draw_cases
 from armlab.proof.open.real_concealed.examine import (
     OUTCOME_ADAPTER,
     ExaminedCase,
     ReportedFinding,
     diagnose_concealed,
-    open_outcomes,
     sought_in_case,
 )
-from armlab.proof.open.real_concealed.fixed_plan import Case
+from armlab.proof.open.real_concealed.finding_words import finding_in_words, list_findings
 from armlab.proof.open.real_concealed.labels import LabelledFinding, label_weighed
 from armlab.proof.open.real_concealed.observation import read_observation, write_observation
-from armlab.proof.open.real_concealed.report import OUTCOMES_FOLDER, finding_in_words, list_findings
 from armlab.proof.open.real_identification.identify_recording import recipe_named
 from armlab.proof.open.real_identification.looks import LOOKS_FILE, Looks
+from armlab.proof.open.stored import code_digest
 from armlab.recordings.public import open_public_recording
 
 REAL_ARMS = ("emps", "staubli-tx40", "unisa-ur10", "unisa-panda", "kuka-kr300")
+OUTCOMES_FOLDER = ".concealed"  # below that of the recordings
 TABLES = ("cases.csv", "claims.csv", "recordings.csv")
 WEIGHED_FILE, WEIGHED_SCHEMA = "weighed.json", "weighed/1"
 CASE_COLUMNS = (
@@ -116,7 +117,7 @@ def conceal_at_random(
     recordings: folder of the recordings, which are fetched into it. results: folder of the log of looks. out: folder of
     the tables. What was diagnosed before an interruption is not diagnosed again.
     """
-    code = open_outcomes(recordings).code
+    code = code_digest(*Path(__file__).parent.glob("*.py"))
     folder = recordings / OUTCOMES_FOLDER / f"random-{settings.seed}-{settings.cases}-{code[:20]}"
     wanted = {name: [f"{name}-{number}" for number in range(settings.cases + 1)] for name in settings.recordings}
     new = [name for name, keys in wanted.items() if not all(_truth_file(folder, key).is_file() for key in keys)]
@@ -168,7 +169,7 @@ def examine_observation(
     observation: Path, out: Path, progress: Callable[[str], None] = lambda message: None
 ) -> Iterator[str]:
     """Diagnoses the recording of an observation, and writes what is said into a folder."""
-    _, outcome = diagnose_concealed(*read_observation(observation), progress)
+    outcome = diagnose_concealed(*read_observation(observation), progress)
     text = OUTCOME_ADAPTER.dump_json(outcome, indent=1).decode() + "\n"
     yield from (f"wrote {path}" for path in write_texts({OUTCOME_FILE: text}, out))
 
@@ -205,7 +206,7 @@ def _read_outcome(folder: Path) -> ExaminedCase:
     try:
         return OUTCOME_ADAPTER.validate_json((folder / OUTCOME_FILE).read_bytes())
     except FileNotFoundError:
-        return ExaminedCase(folder.name, (), (), (), (), (), None, 0.0, "no verdict")
+        return ExaminedCase(folder.name, (), 0.0, "no verdict")
 
 
 def _judge(name: str, judged: Sequence[tuple[RandomTruth, ExaminedCase]], control: ExaminedCase) -> RandomStudy:

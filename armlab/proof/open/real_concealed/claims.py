@@ -5,10 +5,10 @@ from typing import Literal
 
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import EFFECT_IDS, effect_named
+from armlab.proof.open.real_concealed.beside_control import BesideControl, Findings, is_same_kind
 from armlab.proof.open.real_concealed.conceal import SoughtEffect
 from armlab.proof.open.real_concealed.draw import DrawnCase
 from armlab.proof.open.real_concealed.examine import ExaminedCase, ReportedFinding
-from armlab.proof.open.real_concealed.judge import BesideControl, Findings, is_same_kind
 
 ClaimVerdict = Literal["right", "class", "law", "unknown", "wrong"]
 SoughtAnswer = Literal["named", "class", "law", "cancelled", "absorbed", "unknown", "another name", "missed"]

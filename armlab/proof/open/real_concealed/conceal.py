@@ -14,7 +14,7 @@ from armlab.effects.parameters import ParameterValue
 from armlab.identification.identifier import Identifier
 from armlab.identification.selection import Groups, components_of, describe_choice, select_structure
 from armlab.identification.torque_model import TorqueModel
-from armlab.proof.open.real_concealed.fixed_plan import Disturbance, Piece, PieceKind
+from armlab.proof.open.real_concealed.concealed_case import Disturbance, Piece, PieceKind
 from armlab.proof.open.real_identification.identify_recording import Recipe
 from armlab.recordings.differentiate import differentiate, resample_evenly
 from armlab.recordings.recording import Recording, Run

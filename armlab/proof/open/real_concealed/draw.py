@@ -21,7 +21,7 @@ from armlab.proof.open.real_concealed.conceal import (
     add_disturbance,
     withhold_pieces,
 )
-from armlab.proof.open.real_concealed.fixed_plan import Case, Disturbance, DisturbanceKind, Piece, PieceKind
+from armlab.proof.open.real_concealed.concealed_case import Case, Disturbance, DisturbanceKind, Piece, PieceKind
 from armlab.proof.open.real_identification.identify_recording import recipe_named
 from armlab.recordings.differentiate import Signals
 from problem.arm import Arm

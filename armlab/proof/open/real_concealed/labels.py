@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from armlab.diagnosis.result import WeighedName
+from armlab.proof.open.real_concealed.beside_control import BesideControl, is_same_kind
 from armlab.proof.open.real_concealed.conceal import SoughtEffect
 from armlab.proof.open.real_concealed.examine import ExaminedCase, ReportedFinding, joints_of
-from armlab.proof.open.real_concealed.judge import BesideControl, is_same_kind
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from armlab.proof.open.real_concealed.conceal import ReferenceModel
+from armlab.proof.open.real_concealed.concealed_case import Case
 from armlab.proof.open.real_concealed.examine import conceal_case
-from armlab.proof.open.real_concealed.fixed_plan import Case
 from armlab.recordings.load import open_recording
 from armlab.recordings.recording import Finding, Recording, Role, Run
 from armlab.recordings.recording_file import read_recording_file
@@ -48,7 +48,7 @@ def write_observation(reference: ReferenceModel, case: Case, folder: Path) -> No
     answers = [entry.file for entry in read_recording_file(public).runs]
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(public, folder, ignore=shutil.ignore_patterns(*answers))
-    seen, _ = conceal_case(reference, case, folder / REFERENCE_FILE)
+    seen = conceal_case(reference, case, folder / REFERENCE_FILE)
     for number, run in enumerate(seen.runs, 1):
         np.savez(_run_file(folder, number), allow_pickle=False, time=run.time, **run.signals)
     notes = tuple(_RunNote(run.file, run.role, run.part, run.findings) for run in seen.runs)

@@ -64,8 +64,7 @@ def _at_hand(recordings: Path, folders: Sequence[Path], only: Sequence[str]) -> 
 
 
 def _key(recording: Recording, name: str) -> str:
-    own = Path(__file__).parent
-    code = code_digest(*own.glob("*.py"), *(own.parent / "compare").glob("*.py"))
+    code = code_digest(*Path(__file__).parent.glob("*.py"))
     whole = f"{code} {recording_digest(recording)} {recording.name} {name}"
     return hashlib.sha256(whole.encode()).hexdigest()
 
