@@ -8,7 +8,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Scene
-from armlab.recordings.filters import Filter
+from armlab.recordings.filters import Butterworth
 from problem.base_parameters import BaseParameters
 from problem.regressor import observation_matrix
 
@@ -39,7 +39,7 @@ class Confusion:
 def compute_confusion(
     candidates: Sequence[Candidate],
     scenes: Sequence[Scene],
-    filters: Sequence[Filter],
+    filters: Sequence[Butterworth],
     nuisance: Array | None = None,
     noise: Array | None = None,
 ) -> Confusion:
@@ -56,7 +56,7 @@ def compute_confusion(
     return Confusion(tuple(candidates), np.array([visible for visible, _ in found]), closest, covered)
 
 
-def candidate_rows(candidate: Candidate, scenes: Sequence[Scene], filters: Sequence[Filter]) -> Array:
+def candidate_rows(candidate: Candidate, scenes: Sequence[Scene], filters: Sequence[Butterworth]) -> Array:
     """A candidate's filtered columns over all runs and joints: (kept rows * joints, coefficients)."""
     parts = []
     for scene, keep in zip(scenes, filters, strict=True):
@@ -67,7 +67,7 @@ def candidate_rows(candidate: Candidate, scenes: Sequence[Scene], filters: Seque
     return np.concatenate(parts)
 
 
-def base_rows(base: BaseParameters, scenes: Sequence[Scene], filters: Sequence[Filter]) -> Array:
+def base_rows(base: BaseParameters, scenes: Sequence[Scene], filters: Sequence[Butterworth]) -> Array:
     """Filtered columns of the base parameters, rows as from `rows_of`."""
     parts = []
     for scene, keep in zip(scenes, filters, strict=True):

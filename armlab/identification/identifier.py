@@ -35,7 +35,6 @@ from armlab.identification.priors import NO_PULL, Pull
 from armlab.identification.recorded_motion import RecordedMotion
 from armlab.identification.regression import (
     Regression,
-    cutoff_of,
     regression,
     require_rows,
     signals_of,
@@ -115,7 +114,7 @@ class Identifier:
         structure, signals, data = self.prepare(runs)
         if self.pull.kind == NO_PULL.kind:
             require_rows(data)
-        cutoff = cutoff_of(signals[0])
+        cutoff = signals[0].filter.cutoff_hz
         for _ in range(MAX_LOAD_ROUNDS):
             estimate = METHODS[self.method]((structure, signals, data), self.pull)(data)
             if structure.load is None:

@@ -11,7 +11,6 @@ from armlab.common.errors import DataError
 from armlab.identification.structure import Structure
 from armlab.recordings.cutoff import ROWS_PER_CUTOFF, choose_cutoff
 from armlab.recordings.differentiate import Signals, differentiate, resample_evenly
-from armlab.recordings.filters import Butterworth, LowPass
 from armlab.recordings.recording import Run
 from problem.drive_torque import torque_beside_columns
 
@@ -79,27 +78,15 @@ def signals_of(run: Run, cutoff_hz: float | None = None, position_factor: float 
 
 
 def refilter(signals: Signals, run: Run) -> Signals:
-    """Another version of the run of these signals through the same filters.
-
-    Raises ValueError for signals that did not pass a low-pass.
-    """
+    """Another version of the run of these signals through the same filters."""
     shared = signals.filter
-    if not isinstance(shared, LowPass):
-        raise DataError(f"{signals.run.name} did not pass a low-pass")
-    return differentiate(run, type(shared), signals.position_cutoff_hz, shared.cutoff_hz, shared.step)
-
-
-def cutoff_of(signals: Signals) -> float:
-    """The cut-off of the filter that the signals passed, Hz; ValueError for another filter than a low-pass."""
-    if not isinstance(signals.filter, LowPass):
-        raise DataError(f"{signals.run.name} did not pass a low-pass: it has no cut-off")
-    return signals.filter.cutoff_hz
+    return differentiate(run, signals.position_cutoff_hz, shared.cutoff_hz, shared.step)
 
 
 def suggested_cutoff(run: Run) -> float:
     """The cut-off that the positions of a run suggest, Hz."""
     even = resample_evenly(run)
-    return choose_cutoff(even.position, even.rate_hz, Butterworth).cutoff_hz
+    return choose_cutoff(even.position, even.rate_hz).cutoff_hz
 
 
 def _target(structure: Structure, signals: Signals) -> Array:
@@ -134,5 +121,6 @@ def regression(structure: Structure, signals: Sequence[Signals]) -> Regression:
     torque = np.concatenate([_target(structure, each).ravel() for each in signals])
     first = signals[0]
     rate = 1 / float(np.median(np.diff(first.time)))
-    cutoff = first.filter.cutoff_hz if isinstance(first.filter, LowPass) else rate / 2
-    return Regression(matrix, torque, joints, tuple(len(each.torque) for each in signals), rate, 1 / cutoff)
+    return Regression(
+        matrix, torque, joints, tuple(len(each.torque) for each in signals), rate, 1 / first.filter.cutoff_hz
+    )

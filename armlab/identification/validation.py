@@ -9,7 +9,6 @@ from armlab.common.arrays import Array
 from armlab.common.report.wording import format_number
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.differentiate import Signals
-from armlab.recordings.filters import LowPass
 
 MIN_TORQUE = 1e-9  # N m (N), root mean square: less is a signal without power, whose share says nothing
 
@@ -54,7 +53,7 @@ def run_error(model: TorqueModel, signals: Signals) -> RunError:
         run=signals.run.name,
         role=signals.run.role,
         relative_percent=relative_percent(left, signals.torque),
-        cutoff_hz=signals.filter.cutoff_hz if isinstance(signals.filter, LowPass) else None,
+        cutoff_hz=signals.filter.cutoff_hz,
         recorded_percent=relative_percent(raw, recorded),
         joints=joints,
     )

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.fft import dst
 
 from armlab.common.arrays import Array
-from armlab.recordings.filters import LowPass
+from armlab.recordings.filters import Butterworth
 
 CANDIDATE_COUNT = 60
 MIN_CUTOFF_PERIODS = 10  # periods of the lowest candidate within the run
@@ -40,7 +40,7 @@ class CutoffChoice:
     noise: Array
 
 
-def choose_cutoff(position: Array, rate_hz: float, low_pass: type[LowPass]) -> CutoffChoice:
+def choose_cutoff(position: Array, rate_hz: float) -> CutoffChoice:
     """The cut-off with the least estimated mean-square error of the acceleration (Mallows 1973, eq. C_p).
 
     position: (samples, joints), at an even rate. Position noise is assumed to be white; its level is
@@ -54,7 +54,7 @@ def choose_cutoff(position: Array, rate_hz: float, low_pass: type[LowPass]) -> C
     moving = power > 0
     risk = np.empty(CANDIDATE_COUNT)
     for index, cutoff in enumerate(candidates):
-        gain = low_pass(rate_hz, float(cutoff), len(position)).response(frequency)[:, None]
+        gain = Butterworth(rate_hz, float(cutoff), len(position)).response(frequency)[:, None]
         errors = np.sum((1 - gain) ** 2 * (spectrum - noise) + gain**2 * noise, axis=0)
         risk[index] = np.sum(errors[moving] / power[moving])
     motion_hz = bandwidth(frequency, spectrum - noise, rate_hz)

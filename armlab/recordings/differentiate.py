@@ -7,7 +7,7 @@ from scipy.interpolate import make_interp_spline
 
 from armlab.common.arrays import Array
 from armlab.recordings.cutoff import CutoffChoice, choose_cutoff
-from armlab.recordings.filters import Butterworth, Filter, LowPass
+from armlab.recordings.filters import Butterworth
 from armlab.recordings.recording import Run
 from problem.motion import Motion
 
@@ -47,7 +47,6 @@ class Signals:
     """A run made ready for identification.
 
     run: even in time, unfiltered. motion: (samples, joints), all rows. torque: (kept, joints), filtered.
-    torque_covariance: (joints, joints) of the noise of one row of torque, where repetitions have shown it.
     cutoff: how the cut-off was chosen, None where it was given. position_cutoff_hz: of the positions, None where
     they passed no low-pass.
     """
@@ -55,9 +54,8 @@ class Signals:
     run: Run
     motion: Motion
     torque: Array
-    filter: Filter
+    filter: Butterworth
     cutoff: CutoffChoice | None = None
-    torque_covariance: Array | None = None
     position_cutoff_hz: float | None = None
 
     @property
@@ -78,7 +76,6 @@ class Signals:
 
 def differentiate(
     run: Run,
-    low_pass: type[LowPass] = Butterworth,
     cutoff_hz: float | None = None,
     torque_cutoff_hz: float | None = None,
     step: int = 1,
@@ -90,11 +87,11 @@ def differentiate(
     Raises ValueError for a cut-off above half the sampling rate.
     """
     run = resample_evenly(run)
-    choice = None if cutoff_hz else choose_cutoff(run.position, run.rate_hz, low_pass)
+    choice = None if cutoff_hz else choose_cutoff(run.position, run.rate_hz)
     cutoff = cutoff_hz or (choice.cutoff_hz if choice else 0.0)
-    smooth = low_pass(run.rate_hz, cutoff, run.samples).smooth(run.position)
-    both = low_pass(run.rate_hz, torque_cutoff_hz or cutoff, run.samples, step)
-    return Signals(run, _spline_motion(run.time, smooth), both(run.torque), both, choice, None, cutoff)
+    smooth = Butterworth(run.rate_hz, cutoff, run.samples).smooth(run.position)
+    both = Butterworth(run.rate_hz, torque_cutoff_hz or cutoff, run.samples, step)
+    return Signals(run, _spline_motion(run.time, smooth), both(run.torque), both, choice, cutoff)
 
 
 def _spline_motion(time: Array, position: Array) -> Motion:

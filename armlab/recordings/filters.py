@@ -5,12 +5,10 @@ differs from the torque there, and a fit explains the difference by effects that
 both.
 """
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import solveh_banded
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from armlab.common.arrays import Array
@@ -19,26 +17,12 @@ from armlab.common.errors import DataError
 BUTTERWORTH_ORDER = 4  # of the Butterworth filter each way
 
 
-class Filter(ABC):
-    """Smooths along the first axis, then selects rows: not those near the ends, and not more than needed."""
-
-    @property
-    @abstractmethod
-    def rows(self) -> slice:
-        """The rows that are kept after smoothing."""
-
-    @abstractmethod
-    def smooth(self, signal: Array) -> Array:
-        """The smoothed signal, (samples, ...), all rows."""
-
-    def __call__(self, signal: Array) -> Array:
-        """The smoothed signal, rows near the ends left out and thinned: (kept, ...)."""
-        return self.smooth(signal)[self.rows]
-
-
 @dataclass(frozen=True)
-class LowPass(Filter):
-    """A low-pass with half gain at `cutoff_hz`; keeps each `step`-th row but `trim` rows at both ends."""
+class Butterworth:
+    """Butterworth filter run forwards and backwards (Gustafsson 1996 for the ends: odd extension here).
+
+    Half gain at `cutoff_hz`; of the filtered rows it keeps each `step`-th one but `trim` at both ends.
+    """
 
     rate_hz: float
     cutoff_hz: float
@@ -61,14 +45,9 @@ class LowPass(Filter):
         """The rows that are kept."""
         return slice(self.trim, self.samples - self.trim, self.step)
 
-    @abstractmethod
-    def response(self, frequency_hz: Array) -> Array:
-        """Gain at each frequency, between 0 and 1."""
-
-
-@dataclass(frozen=True)
-class Butterworth(LowPass):
-    """Butterworth filter run forwards and backwards (Gustafsson 1996 for the ends: odd extension here)."""
+    def __call__(self, signal: Array) -> Array:
+        """The smoothed signal, rows near the ends left out and thinned: (kept, ...)."""
+        return self.smooth(signal)[self.rows]
 
     def smooth(self, signal: Array) -> Array:
         """The smoothed signal, (samples, ...)."""
@@ -93,38 +72,3 @@ def _butterworth_sections(cutoff_hz: float, rate_hz: float) -> tuple[Array, Arra
     """Second-order sections and their settled state; cached, because thousands of columns pass one filter."""
     sections = np.asarray(butter(BUTTERWORTH_ORDER, cutoff_hz, fs=rate_hz, output="sos"))
     return sections, np.asarray(sosfilt_zi(sections))
-
-
-@dataclass(frozen=True)
-class SmoothingSpline(LowPass):
-    """Cubic smoothing spline on even knots (Reinsch 1967): gain 1 / (1 + penalty frequency^4)."""
-
-    def smooth(self, signal: Array) -> Array:
-        """Values of the spline at the samples, (samples, ...).
-
-        With Q the second differences and R their Gram matrix of hat functions, (R + penalty Q'Q) gamma = Q' y
-        gives the second derivatives gamma, and y - penalty Q gamma the values.
-        """
-        values = signal.reshape(len(signal), -1)
-        count = len(signal) - 2
-        bands = np.empty((3, count))
-        bands[0], bands[1], bands[2] = self.penalty, 1 / 6 - 4 * self.penalty, 2 / 3 + 6 * self.penalty
-        curvature = solveh_banded(bands, np.diff(values, n=2, axis=0))
-        padded = np.zeros((count + 4, values.shape[1]))
-        padded[2:-2] = curvature
-        return np.asarray(values - self.penalty * np.diff(padded, n=2, axis=0)).reshape(signal.shape)
-
-    @property
-    def penalty(self) -> float:
-        """Weight of the squared second derivative, with the sample as the unit of time."""
-        return float(1 / _roughness(np.array(self.cutoff_hz / self.rate_hz)))
-
-    def response(self, frequency_hz: Array) -> Array:
-        """Gain at each frequency, far from the ends."""
-        return np.asarray(1 / (1 + self.penalty * _roughness(frequency_hz / self.rate_hz)))
-
-
-def _roughness(cycles: Array) -> Array:
-    """|Q|^2 / R at a frequency in cycles per sample."""
-    cosine = np.cos(2 * np.pi * cycles)
-    return np.asarray((2 - 2 * cosine) ** 2 / ((2 + cosine) / 3))

@@ -339,7 +339,7 @@ def suggested_cutoff_hz(runs: Sequence[Run]) -> float:
     if not runs:
         raise DataError("no run identifies")
     even = [resample_evenly(run) for run in runs]
-    return max(choose_cutoff(run.position, run.rate_hz, Butterworth).cutoff_hz for run in even)
+    return max(choose_cutoff(run.position, run.rate_hz).cutoff_hz for run in even)
 
 
 def prepare_rows(run: Run, cutoff_hz: float) -> PlainRows:

@@ -26,7 +26,7 @@ from armlab.diagnosis.torque.rows.features import (
 from armlab.diagnosis.torque.rows.noise import Noise, error_colours, fit_noise
 from armlab.diagnosis.torque.rows.simulation import read_simulation
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_background
-from armlab.diagnosis.torque.search.surrogate import Remainder, Structure, find_structure
+from armlab.diagnosis.torque.search.surrogate import Remainder, Structure, fit_surrogate
 from armlab.diagnosis.tuning import Tuning
 from armlab.effects.library import library
 from armlab.effects.memory import dahl_state
@@ -164,7 +164,8 @@ def filtered(values: Array, observed: Observed) -> Array:
 def structure_of(left: Array, joint: int, made: Features, noise: Noise, observed: Observed) -> Structure:
     """What features predict of a signal (rows,) that no model has been fitted to. joint: from 0."""
     remainder = Remainder(left, made)
-    return find_structure(remainder, remainder, joint, noise, observed, TUNING.surrogate)
+    surrogate = fit_surrogate(remainder, remainder, joint, noise, observed, TUNING.surrogate)
+    return surrogate.structure(observed, TUNING.surrogate)
 
 
 def test_a_surrogate_finds_structure_of_other_joints_and_none_in_noise(observed: Observed) -> None:

@@ -21,7 +21,7 @@ from armlab.diagnosis.settings import Settings
 from armlab.effects.contract import Candidate, Family, Scene
 from armlab.effects.separability import Confusion, base_rows, candidate_rows, compute_confusion
 from armlab.recordings.differentiate import differentiate
-from armlab.recordings.filters import Butterworth, Filter
+from armlab.recordings.filters import Butterworth
 from armlab.recordings.load import load_recording
 from armlab.recordings.repair import MAX_PLAUSIBLE_VALUE
 from armlab.recordings.table import read_table
@@ -194,7 +194,7 @@ def confusability_card(
 
 
 def visible_candidates(
-    arm: Arm, scenes: Sequence[Scene], filters: Sequence[Filter], families: Sequence[Family]
+    arm: Arm, scenes: Sequence[Scene], filters: Sequence[Butterworth], families: Sequence[Family]
 ) -> list[Candidate]:
     """One candidate a place, in the middle of its shapes; none whose columns vanish on this motion."""
     places = [shapes for family in families for shapes in family.candidates(arm, scenes)]
@@ -212,7 +212,7 @@ def _planned_scene(arm: Arm, planned: PlannedMotion) -> Scene:
     return Scene(planned.name, planned.time, planned.motion, arm, inertial, torque)
 
 
-def _diagnosis_filter(planned: PlannedMotion, settings: Settings) -> Filter:
+def _diagnosis_filter(planned: PlannedMotion, settings: Settings) -> Butterworth:
     tuning = settings.tuning.data
     cutoff = min(tuning.cutoff_hz, tuning.max_cutoff_ratio * planned.rate_hz)
     step = max(int(planned.rate_hz / (tuning.rows_per_cutoff * cutoff)), 1)

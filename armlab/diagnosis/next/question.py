@@ -11,7 +11,7 @@ from armlab.diagnosis.next.moments import ROUNDING_SHARE, DesignMoments, Index, 
 from armlab.diagnosis.next.sampling import Sampling, kept_columns
 from armlab.effects.contract import Candidate, Effect, Scene
 from armlab.effects.library import effect_named
-from armlab.recordings.filters import Filter
+from armlab.recordings.filters import Butterworth
 from problem.base_parameters import BaseParameters
 
 CLEAR_SEPARATION = 4.0  # standard errors between two rivals that decide
@@ -157,7 +157,7 @@ class RivalColumns:
         """Indices of the columns of a candidate."""
         return self.places[self.candidates.index(candidate)]
 
-    def moments(self, scene: Scene, keep: Filter, sampling: Sampling) -> DesignMoments:
+    def moments(self, scene: Scene, keep: Butterworth, sampling: Sampling) -> DesignMoments:
         """Moments of a motion whose torque is not recorded yet: the vector is zero."""
         columns = kept_columns(self.base, self.candidates, scene, keep, smooth=True)
         rows = sampling.whiten(columns, scene.motion.velocity)

@@ -14,7 +14,7 @@ from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.rows.data import Segment, rows_in, split_segment
 from armlab.diagnosis.torque.rows.noise import Noise
 from armlab.effects.contract import Candidate, Scene
-from armlab.recordings.filters import Butterworth, Filter
+from armlab.recordings.filters import Butterworth
 from problem.base_parameters import BaseParameters
 from problem.regressor import observation_matrix
 
@@ -58,7 +58,7 @@ class Sampling:
         """Instants of a designed motion, s."""
         return np.asarray(np.arange(round(duration * self.rate_hz) + 1) / self.rate_hz)
 
-    def filter(self, samples: int) -> Filter:
+    def filter(self, samples: int) -> Butterworth:
         """The filter of a designed motion."""
         return Butterworth(self.rate_hz, self.cutoff_hz, samples, SAMPLES_PER_ROW)
 
@@ -102,7 +102,7 @@ def white_noise_sampling(levels: Array, cutoff_hz: float) -> Sampling:
 
 
 def kept_columns(
-    base: BaseParameters, candidates: tuple[Candidate, ...], scene: Scene, keep: Filter, smooth: bool = False
+    base: BaseParameters, candidates: tuple[Candidate, ...], scene: Scene, keep: Butterworth, smooth: bool = False
 ) -> Array:
     """Base parameters' columns, then the candidates', at the kept rows: (rows, joints, columns).
 

@@ -54,10 +54,7 @@ def encoder_deviation(run: Run) -> Array:
 
 
 def column_noise(structure: Structure, signals: Signals, rng: np.random.Generator, draws: int = 4) -> Array:
-    """What encoder noise does to the columns: (draws, kept * joints, columns) differences.
-
-    Raises ValueError for signals that did not pass a low-pass.
-    """
+    """What encoder noise does to the columns: (draws, kept * joints, columns) differences."""
     deviation, clean = encoder_deviation(signals.run), structure.filtered(signals)
 
     def disturbed() -> Array:

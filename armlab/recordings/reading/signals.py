@@ -12,7 +12,7 @@ from armlab.common.arrays import Array
 from armlab.recordings.channels import gravity_torque
 from armlab.recordings.cutoff import MAX_CUTOFF_SHARE, MIN_CUTOFF_PERIODS, travel_bandwidth
 from armlab.recordings.differentiate import Signals, differentiate, resample_evenly
-from armlab.recordings.filters import Filter
+from armlab.recordings.filters import Butterworth
 from armlab.recordings.reading.reading import Reading, second_drives
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording, Run
@@ -33,7 +33,7 @@ class Channels:
     stamps: Array
     run: NDArray[np.intp]
     torques: tuple[tuple[Array, Array], ...]
-    velocities: tuple[tuple[Array, Filter, NDArray[np.intp]], ...]
+    velocities: tuple[tuple[Array, Butterworth, NDArray[np.intp]], ...]
     block: NDArray[np.intp]
     margin_s: float
     _shifted: dict[float, Array] = field(default_factory=dict)

@@ -14,7 +14,6 @@ from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.tuning import DataTuning
 from armlab.recordings.cutoff import acceleration_spectrum, choose_cutoff, noise_level
 from armlab.recordings.differentiate import Signals, differentiate, resample_at, resample_evenly
-from armlab.recordings.filters import Butterworth, LowPass
 from armlab.recordings.recording import ROLES, Role, Run
 from problem.arm import Arm
 from problem.joint_words import joint_in_words
@@ -58,8 +57,7 @@ def _moving_rows_of_run(signals: Signals, cutoff_hz: float, creep: Array, tuning
     noise = 2 * np.pi * np.sqrt(density * cutoff_hz**3 / 3)  # of white noise, differentiated, up to the cut-off
     slow = np.abs(signals.motion.velocity) < np.maximum(tuning.standstill_sigmas * noise, creep)
     still = binary_opening(slow, structure=np.ones((max(round(tuning.min_standstill_s * run.rate_hz), 1), 1)))
-    low_pass = signals.filter
-    reach = tuning.standstill_margin / (low_pass.cutoff_hz if isinstance(low_pass, LowPass) else cutoff_hz)
+    reach = tuning.standstill_margin / signals.filter.cutoff_hz
     near = binary_dilation(still, structure=np.ones((2 * round(reach * run.rate_hz) + 1, 1)))
     return np.asarray(~near[signals.filter.rows])
 
@@ -181,8 +179,7 @@ class Observed:
     @property
     def cutoff_hz(self) -> float:
         """Of the filter that torque and columns share."""
-        low_pass = self.signals[0].filter
-        return low_pass.cutoff_hz if isinstance(low_pass, LowPass) else self.rate_hz / 2
+        return self.signals[0].filter.cutoff_hz
 
     def of_role(self, role: Role, joint: int | None = None) -> tuple[Segment, ...]:
         """The segments of a role; only the parts in which a joint (from 0) moves, if one is given."""
@@ -269,7 +266,7 @@ def _resample(run: Run, rate: float) -> Run:
 
 
 def _smooth_motion(run: Run, highest_hz: float) -> Motion:
-    choice = choose_cutoff(run.position, run.rate_hz, Butterworth).cutoff_hz
+    choice = choose_cutoff(run.position, run.rate_hz).cutoff_hz
     return differentiate(run, cutoff_hz=min(choice, highest_hz)).motion
 
 

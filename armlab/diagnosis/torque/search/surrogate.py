@@ -192,13 +192,6 @@ def surest(surrogates: Iterable[Surrogate], tuning: SurrogateTuning) -> Surrogat
     return min(surrogates, key=lambda each: (each.gain <= tuning.min_structure_gain, each.p_value))
 
 
-def find_structure(
-    learnt: Remainder, whole: Remainder, joint: int, noise: Noise, observed: Observed, tuning: SurrogateTuning
-) -> Structure:
-    """What features predict of what is left at a joint: see `fit_surrogate`."""
-    return fit_surrogate(learnt, whole, joint, noise, observed, tuning).structure(observed, tuning)
-
-
 def fit_surrogate(
     learnt: Remainder, whole: Remainder, joint: int, noise: Noise, observed: Observed, tuning: SurrogateTuning
 ) -> Surrogate:

@@ -11,7 +11,7 @@ from armlab.effects.contract import Candidate
 from armlab.identification.components import usual_components
 from armlab.identification.estimators.least_squares import least_squares
 from armlab.identification.identifier import Identifier
-from armlab.identification.regression import Regression, cutoff_of, regression, signals_of
+from armlab.identification.regression import Regression, regression, signals_of
 from armlab.identification.selection import counterbalance_groups
 from armlab.proof.open.conditioning.criteria import window_criteria
 from armlab.proof.open.conditioning.windows import BLOCKS, RunWindows, block_rows
@@ -97,7 +97,7 @@ def study_arm(recipe: Recipe, recording: Recording, simulations: int = SIMULATIO
     """
     identifier = Identifier(recording.arm, plain_components(recording.arm, recipe), "ordinary")
     structure, signals, data = identifier.prepare(recording.with_role("identify"))
-    cutoff = cutoff_of(signals[0])
+    cutoff = signals[0].filter.cutoff_hz
     runs = recording.with_role("validate")
     judged = regression(structure, [signals_of(run, cutoff) for run in runs])
     fitted = least_squares(data.matrix, data.torque)

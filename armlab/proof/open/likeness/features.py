@@ -15,7 +15,6 @@ from armlab.common.arrays import Array
 from armlab.common.errors import DataError
 from armlab.recordings.cutoff import choose_cutoff
 from armlab.recordings.differentiate import resample_evenly
-from armlab.recordings.filters import Butterworth
 from armlab.recordings.load import load_recording
 from armlab.recordings.motion import is_motion_only, load_motion_recording
 from armlab.recordings.plain_least_squares import (
@@ -122,7 +121,7 @@ def read_runs(folder: Path) -> tuple[Arm, tuple[int, ...], tuple[Run, ...]]:
 def motion_band_hz(run: Run) -> float:
     """The band that holds 99 % of the power of the velocity, Hz."""
     even = resample_evenly(run)
-    return choose_cutoff(even.position, even.rate_hz, Butterworth).motion_hz
+    return choose_cutoff(even.position, even.rate_hz).motion_hz
 
 
 def _links_torque(fit: PlainFit) -> list[Array]:
