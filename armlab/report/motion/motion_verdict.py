@@ -37,7 +37,7 @@ from armlab.diagnosis.tuning import NamingTuning
 from armlab.effects.library import effect_named
 from armlab.report.motion.motion_words import summary_of
 from armlab.report.motion.stated_numbers import StatedNumber, stated_causes, stated_numbers
-from armlab.report.torque.names_file import names_texts
+from armlab.report.torque.naming_files import names_texts
 from problem.robot_file import built_in_arms
 
 MODEL, SIMULATION = "model.yaml", "simulation.xml"

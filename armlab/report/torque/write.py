@@ -21,9 +21,8 @@ from armlab.recordings.reading.corrected import CORRECTED_FOLDER
 from armlab.report.signals_file import SIGNALS_FILE, check_signals_writer, diagnosis_tracks, signals_content
 from armlab.report.torque import content, measured
 from armlab.report.torque.gallery import Gallery, draw_gallery
-from armlab.report.torque.names_file import names_texts
+from armlab.report.torque.naming_files import names_texts, parse_place, steps_texts, why_lines
 from armlab.report.torque.residuals import select_residuals
-from armlab.report.torque.steps_file import parse_place, steps_texts, why_lines
 from armlab.report.torque.verdict import first_screen, verdict_lines
 from armlab.report.verdict_files import (
     PREDICTED_FOLDER,

@@ -16,7 +16,7 @@ from armlab.diagnosis.torque.evidence.evidence import Evidence
 from armlab.diagnosis.torque.evidence.pruning import first_failed_test
 from armlab.diagnosis.torque.search.search import FailedTest, Step
 from armlab.diagnosis.torque.stages import BY_PROBABILITY, BY_TESTS
-from armlab.report.torque.steps_file import STEPS_FILE, parse_place, steps_texts, why_lines
+from armlab.report.torque.naming_files import STEPS_FILE, parse_place, steps_texts, why_lines
 from problem.motion import Motion
 
 SURE = Evidence(0, 1e-9, 1e-9, 0.5, 1e-9, 0.5, 1.0, 0.5, 500.0)

@@ -1,13 +1,18 @@
-"""`steps.json`: how the names of a diagnosis were found and lost; and the answer to `--why EFFECT@JOINT`."""
+"""How findings got their names: `steps.json`, all moves and tests; `names.json`, what each finding was weighed against;
+and the answer to `--why EFFECT@JOINT`.
+"""
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict
 from typing import Any, Final
 
 from armlab.common.errors import InputError
 from armlab.common.report.wording import format_number
-from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.result import Diagnosis, Weighed
+from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.torque.names.decide import with_probabilities
 from armlab.diagnosis.torque.search.search import FailedTest, Step
 from armlab.diagnosis.tuning import SearchTuning
 from armlab.effects.library import effect_named
@@ -17,6 +22,8 @@ from problem.arm import Arm
 
 STEPS_SCHEMA: Final = "steps/1"
 STEPS_FILE: Final = "steps.json"
+NAMES_SCHEMA: Final = "names/1"
+NAMES_FILE: Final = "names.json"
 SEARCH: Final = "search"  # the stage before the others
 LEAST_GAIN = SearchTuning().min_score_step  # nats, that a search asks of an effect
 
@@ -42,6 +49,16 @@ def _step_entry(step: Step) -> dict[str, Any]:
         return {"stage": step.stage or SEARCH, "what": step.what, "score": step.score}
     test = {"test": failed.test, "value": failed.value, "bound": failed.bound, "number": failed.number or None}
     return {"stage": step.stage, "what": step.what, **test, "has_to_be": "at least" if failed.at_least else "at most"}
+
+
+def names_texts(findings: Iterable[Weighed], settings: Settings) -> dict[str, str]:
+    """The file: of each finding its names, with what speaks for each and its probability; nothing without findings."""
+    entries = [
+        {"names": [{**asdict(name), "probability": chance} for name, chance in with_probabilities(weighed, settings)]}
+        for weighed in findings
+    ]
+    content = {"schema": NAMES_SCHEMA, "findings": entries}
+    return {NAMES_FILE: json.dumps(content, indent=1) + "\n"} if entries else {}
 
 
 def parse_place(text: str, arm: Arm) -> Place:
