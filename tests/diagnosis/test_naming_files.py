@@ -9,14 +9,24 @@ import pytest
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.result import Diagnosis, Member
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.diagnosis.torque.evidence.evidence import Evidence
 from armlab.diagnosis.torque.evidence.pruning import first_failed_test
 from armlab.diagnosis.torque.search.search import FailedTest, Step
 from armlab.diagnosis.torque.stages import BY_PROBABILITY, BY_TESTS
-from armlab.report.torque.naming_files import STEPS_FILE, parse_place, steps_texts, why_lines
+from armlab.effects.contract import UNKNOWN
+from armlab.report.torque.naming_files import (
+    NAMES_FILE,
+    STEPS_FILE,
+    WeighedOutcome,
+    names_texts,
+    outcome_of,
+    parse_place,
+    steps_texts,
+    why_lines,
+)
 from problem.motion import Motion
 
 SURE = Evidence(0, 1e-9, 1e-9, 0.5, 1e-9, 0.5, 1.0, 0.5, 500.0)
@@ -54,6 +64,23 @@ def test_the_file_holds_every_move_and_every_effect_that_is_not_in_the_model(fou
     not_taken = {(each["effect"], each["joint"]) for each in content["not_taken"]}
     assert ("viscous_friction", 2) not in not_taken
     assert {("viscous_friction", 1), ("backlash", 2), ("time_delay", None)} <= not_taken
+
+
+def test_a_move_of_the_search_says_from_which_score_it_rises(found: Diagnosis) -> None:
+    moves = [each for each in json.loads(steps_texts(found)[STEPS_FILE])["steps"] if each.get("score_before")]
+    assert moves
+    assert all(each["score_before"] < each["score"] for each in moves)
+
+
+def test_each_weighed_finding_says_what_came_of_it(found: Diagnosis) -> None:
+    other = replace(found.weighed[0][0], effect="backlash")
+    both = replace(found, weighed=(*found.weighed, (other, found.weighed[0][-1])))
+    listed = json.loads(names_texts(WeighedOutcome.of_diagnosis(both), Settings())[NAMES_FILE])["findings"]
+    said = [(each["effect"], each["joint"], each["outcome"]) for each in listed]
+    assert said == [("viscous_friction", 2, "named"), ("backlash", 2, "not stated")]
+    assert outcome_of("coulomb_friction", found.claims[0].members) == "named"
+    assert outcome_of(UNKNOWN.id, ()) == "unknown"
+    assert outcome_of("backlash", (Member("backlash", 2, (2,), 0.6), Member("hysteresis", 2, (2,), 0.35))) == "class"
 
 
 def test_a_finding_and_an_effect_that_no_search_takes_are_answered(found: Diagnosis) -> None:

@@ -37,7 +37,7 @@ from armlab.diagnosis.tuning import NamingTuning
 from armlab.effects.library import effect_named
 from armlab.report.motion.motion_words import summary_of
 from armlab.report.motion.stated_numbers import StatedNumber, stated_causes, stated_numbers
-from armlab.report.torque.naming_files import names_texts
+from armlab.report.torque.naming_files import WeighedOutcome, names_texts, outcome_of
 from problem.robot_file import built_in_arms
 
 MODEL, SIMULATION = "model.yaml", "simulation.xml"
@@ -46,9 +46,8 @@ IN_COMPONENTS = ("viscous_friction", "coulomb_friction", "rotor_inertia", "load_
 
 def motion_texts(diagnosis: MotionDiagnosis, folder: Path) -> dict[str, str]:
     """All files of the verdict but the report, as they are to stand in a folder."""
-    last = diagnosis.simulation.last_link
     texts = {"verdict.json": make_motion_verdict(diagnosis).to_json()}
-    texts |= names_texts([weigh_servo(each, last) for each in diagnosis.findings], Settings())
+    texts |= names_texts(_weighed_findings(diagnosis), Settings())
     if diagnosis.servos is not None:
         simulation, servos = diagnosis.simulation, diagnosis.servos
         step = float(simulation.model().opt.timestep)
@@ -66,6 +65,20 @@ def motion_texts(diagnosis: MotionDiagnosis, folder: Path) -> dict[str, str]:
             missing.append(f"no robot.urdf: {error}")
         texts["not-in-simulation.txt"] = "\n".join([*missing, ""]) if missing else "everything is in the file\n"
     return texts
+
+
+def _weighed_findings(diagnosis: MotionDiagnosis) -> Iterator[WeighedOutcome]:
+    """All differences with the names that they may have."""
+    last = diagnosis.simulation.last_link
+    stated = stated_numbers(diagnosis)
+    for finding in diagnosis.findings:
+        weighed = weigh_servo(finding, last)
+        own = next((each for each in stated if each.finding is finding), None)
+        if own is None:
+            yield WeighedOutcome(finding.effect, finding.joint, "not stated", weighed)
+        else:
+            outcome = outcome_of(own.effect, own.naming.members(NamingTuning()))
+            yield WeighedOutcome(own.effect, finding.joint, outcome, weighed)
 
 
 def make_motion_verdict(diagnosis: MotionDiagnosis) -> VerdictFile:

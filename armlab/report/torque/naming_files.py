@@ -4,17 +4,18 @@ and the answer to `--why EFFECT@JOINT`.
 
 import json
 import re
-from collections.abc import Iterable, Iterator
-from dataclasses import asdict
-from typing import Any, Final
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Final, Literal
 
 from armlab.common.errors import InputError
 from armlab.common.report.wording import format_number
-from armlab.diagnosis.result import Diagnosis, Weighed
+from armlab.diagnosis.result import Diagnosis, Member, Weighed
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.names.decide import with_probabilities
 from armlab.diagnosis.torque.search.search import FailedTest, Step
 from armlab.diagnosis.tuning import SearchTuning
+from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 from armlab.effects.words import at_place
 from armlab.report.words import effect_in_words
@@ -46,16 +47,61 @@ def steps_texts(diagnosis: Diagnosis) -> dict[str, str]:
 def _step_entry(step: Step) -> dict[str, Any]:
     failed = step.failed
     if failed is None:
-        return {"stage": step.stage or SEARCH, "what": step.what, "score": step.score}
+        return {"stage": step.stage or SEARCH, "what": step.what, "score_before": step.before, "score": step.score}
     test = {"test": failed.test, "value": failed.value, "bound": failed.bound, "number": failed.number or None}
     return {"stage": step.stage, "what": step.what, **test, "has_to_be": "at least" if failed.at_least else "at most"}
 
 
-def names_texts(findings: Iterable[Weighed], settings: Settings) -> dict[str, str]:
-    """The file: of each finding its names, with what speaks for each and its probability; nothing without findings."""
+Outcome = Literal["named", "class", "unknown", "not stated"]
+
+
+@dataclass(frozen=True)
+class WeighedOutcome:
+    """What was weighed for a finding, and what came of it.
+
+    outcome: named; class, where its name is one of several; unknown; or not stated, where it is no finding of its own.
+    effect, joint: as the verdict states them, else of the name that the search took.
+    """
+
+    effect: str
+    joint: int | None
+    outcome: Outcome
+    weighed: Weighed
+
+    @classmethod
+    def of_diagnosis(cls, diagnosis: Diagnosis) -> "Iterator[WeighedOutcome]":
+        """All that was weighed, in the order of the diagnosis."""
+        for weighed in diagnosis.weighed:
+            claim = next((each for each in diagnosis.claims if each.weighed is weighed), None)
+            if claim is None:
+                yield cls(weighed[0].effect, weighed[0].joint, "not stated", weighed)
+            else:
+                outcome = outcome_of(claim.effect, claim.members)
+                yield cls(claim.effect, claim.joint, outcome, weighed)
+
+
+def outcome_of(effect: str, members: Sequence[Member]) -> Outcome:
+    """Of a finding that is stated. members: of its class."""
+    if effect == UNKNOWN.id:
+        return "unknown"
+    return "class" if members else "named"
+
+
+def names_texts(findings: Iterable[WeighedOutcome], settings: Settings) -> dict[str, str]:
+    """The file: of each finding what came of it, and its names, with what speaks for each and its probability.
+
+    Nothing without findings.
+    """
     entries = [
-        {"names": [{**asdict(name), "probability": chance} for name, chance in with_probabilities(weighed, settings)]}
-        for weighed in findings
+        {
+            "effect": each.effect,
+            "joint": each.joint,
+            "outcome": each.outcome,
+            "names": [
+                {**asdict(name), "probability": chance} for name, chance in with_probabilities(each.weighed, settings)
+            ],
+        }
+        for each in findings
     ]
     content = {"schema": NAMES_SCHEMA, "findings": entries}
     return {NAMES_FILE: json.dumps(content, indent=1) + "\n"} if entries else {}

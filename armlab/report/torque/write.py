@@ -21,7 +21,7 @@ from armlab.recordings.reading.corrected import CORRECTED_FOLDER
 from armlab.report.signals_file import SIGNALS_FILE, check_signals_writer, diagnosis_tracks, signals_content
 from armlab.report.torque import content, measured
 from armlab.report.torque.gallery import Gallery, draw_gallery
-from armlab.report.torque.naming_files import names_texts, parse_place, steps_texts, why_lines
+from armlab.report.torque.naming_files import WeighedOutcome, names_texts, parse_place, steps_texts, why_lines
 from armlab.report.torque.residuals import select_residuals
 from armlab.report.torque.verdict import first_screen, verdict_lines
 from armlab.report.verdict_files import (
@@ -142,7 +142,7 @@ def diagnose_recording(
     pages = verdict_texts(diagnosis, out) | report_texts(diagnosis, command)
     texts: dict[str, str | bytes] = {
         **pages,
-        **names_texts(diagnosis.weighed, settings),
+        **names_texts(WeighedOutcome.of_diagnosis(diagnosis), settings),
         **steps_texts(diagnosis),
         **predicted_texts(diagnosis),
     }

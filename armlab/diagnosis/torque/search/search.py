@@ -47,12 +47,15 @@ class Step:
     """A move of the search or a test of a name, for the log.
 
     score: after a move of the search; 0 for a test. failed: the test that made the move. stage: in which it was made.
+    before: the score before a move that raises it. Where that is not the score after the move before, the search has
+    begun from another state, or with columns that follow another model.
     """
 
     what: str
     score: float
     failed: FailedTest | None = None
     stage: str = ""
+    before: float | None = None
 
     @classmethod
     def against(cls, candidate: Candidate, failed: FailedTest, becomes: str = "withdrawn") -> "Step":
@@ -101,11 +104,11 @@ class Search:
     def climb(self, state: State, steps: list[Step]) -> State:
         """The state where no move raises the score any more."""
         for _ in range(self.tuning.max_moves):
-            better = self._step(state)
+            before, better = self.solver.fit(state).score, self._step(state)
             if better is None:
                 break
             what, state = better
-            steps.append(Step(what, self.solver.fit(state).score))
+            steps.append(Step(what, self.solver.fit(state).score, before=before))
         return state
 
     def _step(self, state: State) -> tuple[str, State] | None:
