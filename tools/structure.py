@@ -1,7 +1,8 @@
 """Figures of the structure of a source tree: `python tools/structure.py [TREE]`; TREE is this repository if left out.
 
-Files and lines without tests, modules that only one other module imports, modules that a diagnosis loads, functions
-that are named by a participle, and files outside the library of effects that name an effect.
+Files and lines without tests, modules that only one other module imports, the longest chain of imports within the
+diagnosis, modules that a diagnosis loads, functions that are named by a participle, names of classes and of files that
+stand twice in a package, and files outside the library of effects that name an effect.
 """
 
 import ast
@@ -80,17 +81,27 @@ LIBRARIES = ("armlab/effects/", "armlab/proof/blind/")
 def main() -> None:
     """Prints the figures."""
     tree = Path(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).resolve().parents[1])
-    files = sorted(path for root in ROOTS for path in (tree / root).rglob("*.py"))
-    sources = {path.relative_to(tree): path.read_text(encoding="utf-8") for path in files}
+    sources = read_sources(tree)
     trees = {path: ast.parse(text) for path, text in sources.items()}
-    print(f"files: {len(files)}")
-    print(f"lines: {sum(text.count(chr(10)) for text in sources.values())}")
+    print(f"files: {len(sources)}")
+    for part in ("", "armlab/", "armlab/diagnosis/", "armlab/proof/"):
+        lines = sum(text.count("\n") for path, text in sources.items() if path.as_posix().startswith(part))
+        print(f"lines{f' of {part}' if part else ''}: {lines}")
     importers = importers_of(trees)
     print(f"modules with one importer: {sum(len(each) == 1 for each in importers.values())}")
+    print(f"longest chain of imports in the diagnosis: {len(longest_chain(importers, 'armlab.diagnosis'))}")
+    names = names_twice(trees)
+    print(f"names that stand twice in a package of armlab: {', '.join(names) or 'none'}")
     print(f"functions named by a participle: {sum(count_participles(each) for each in trees.values())}")
     naming = files_naming_an_effect(sources)
     print(f"files outside the library (and the truth machine) that name an effect: {len(naming)}")
     print(f"modules that a diagnosis loads: {modules_of_a_diagnosis(tree)}")
+
+
+def read_sources(tree: Path) -> dict[Path, str]:
+    """The text of every module, by its path from the top."""
+    files = sorted(path for root in ROOTS for path in (tree / root).rglob("*.py"))
+    return {path.relative_to(tree): path.read_text(encoding="utf-8") for path in files}
 
 
 def module_name(path: Path) -> str:
@@ -109,6 +120,42 @@ def importers_of(trees: dict[Path, ast.Module]) -> dict[str, set[str]]:
                 for target in targets & names:
                     found[target].add(module_name(path))
     return found
+
+
+def longest_chain(importers: dict[str, set[str]], package: str) -> list[str]:
+    """The longest chain of modules of a package of which each imports the next one; imports go no circles."""
+    above = {
+        name: {each for each in found if each.startswith(package)}
+        for name, found in importers.items()
+        if name.startswith(package)
+    }
+    chains: dict[str, list[str]] = {}
+
+    def chain_to(name: str) -> list[str]:
+        if name not in chains:
+            longest = max((chain_to(each) for each in above.get(name, ())), key=len, default=[])
+            chains[name] = [*longest, name]
+        return chains[name]
+
+    return max((chain_to(name) for name in above), key=len, default=[])
+
+
+def names_twice(trees: dict[Path, ast.Module]) -> dict[str, list[Path]]:
+    """Names of classes, and of files, that stand in more than one place of a package of armlab: `armlab/proof: Plan`.
+
+    `bench` is a folder of studies, each with a page of its own.
+    """
+    places: dict[str, list[Path]] = defaultdict(list)
+    for path, tree in trees.items():
+        if path.parts[0] != "armlab":
+            continue
+        package = "/".join(path.parts[:2])
+        if path.name != "__init__.py":
+            places[f"{package}: {path.name}"].append(path)
+        for node in tree.body:
+            if isinstance(node, ast.ClassDef):
+                places[f"{package}: {node.name}"].append(path)
+    return {name: sorted(found) for name, found in sorted(places.items()) if len(found) > 1}
 
 
 def count_participles(tree: ast.Module) -> int:

@@ -63,8 +63,8 @@ def real(
     --leave-one-out leave_one_out.md and .csv instead.
     """
     from armlab.proof.open.real_arms.leave_one_out import leave_arms_out
-    from armlab.proof.open.real_folders.all_folders import FolderBench
-    from armlab.proof.open.real_folders.parts import PublicBench, bench_real
+    from armlab.proof.open.real_folders.all_folders import FolderProof
+    from armlab.proof.open.real_folders.parts import PublicProof, prove_on_real_arms
     from armlab.recordings.public import local_copies
 
     if leave_one_out and (peers is not None or facts is not None or part == "folders"):
@@ -73,9 +73,9 @@ def real(
         raise InputError("--facts are about folders: leave out --facts or --part public")
     if leave_one_out:
         return leave_arms_out(results, recordings, only, tell_progress)
-    folders = None if part == "public" else FolderBench(local_copies(), facts, results, work, jobs)
-    arms = None if part == "folders" else PublicBench(results, recordings, peers)
-    return bench_real(folders, arms, only, tell_progress)
+    folders = None if part == "public" else FolderProof(local_copies(), facts, results, work, jobs)
+    arms = None if part == "folders" else PublicProof(results, recordings, peers)
+    return prove_on_real_arms(folders, arms, only, tell_progress)
 
 
 @click.command()
@@ -183,11 +183,11 @@ def relations(
     others. Writes relations.md; an interrupted command continues. Parts: the short relations, or those of stretches
     that are independent of each other, between which nothing has changed (null-pairs.md).
     """
-    from armlab.proof.open.relations.all_relations import bench_relations
+    from armlab.proof.open.relations.all_relations import check_relations
     from armlab.proof.open.relations.relations import NULL_PAIRS, QUICK, RELATIONS
 
     names = {"all": tuple(RELATIONS), "quick": QUICK, "null-pairs": NULL_PAIRS}[part]
-    return bench_relations(results, recordings, folders, only, names, tell_progress)
+    return check_relations(results, recordings, folders, only, names, tell_progress)
 
 
 @click.command()

@@ -37,7 +37,7 @@ TUNING = Tuning()
 
 
 @pytest.fixture(scope="module")
-def bench() -> DesignMatrix:
+def design() -> DesignMatrix:
     recording = cases.recording(seconds=6.0)
     simulation = read_simulation(recording, None)
     observed = observe(recording.runs, simulation.arm, simulation.inertial, Settings())
@@ -48,13 +48,13 @@ def bench() -> DesignMatrix:
 
 
 @pytest.fixture(scope="module")
-def observed(bench: DesignMatrix) -> Observed:
-    return bench.observed
+def observed(design: DesignMatrix) -> Observed:
+    return design.observed
 
 
-def solved(bench: DesignMatrix) -> Solver:
-    columns = bench.columns
-    return bench.solver(fit_noise(columns.target, bench.observed, 0.0, TUNING.noise))[1]
+def solved(design: DesignMatrix) -> Solver:
+    columns = design.columns
+    return design.solver(fit_noise(columns.target, design.observed, 0.0, TUNING.noise))[1]
 
 
 def test_whitened_autoregressive_noise_is_white_with_unit_variance(observed: Observed) -> None:
@@ -99,15 +99,15 @@ def test_rows_at_rest_count_nothing_in_motion(observed: Observed) -> None:
         assert np.mean(white != 0) > 0.4
 
 
-def test_a_fit_from_moments_is_the_least_squares_fit_of_the_whitened_rows(bench: DesignMatrix) -> None:
-    solver = solved(bench)
-    columns = bench.columns
-    noise = fit_noise(columns.target, bench.observed, 0.0, TUNING.noise)
+def test_a_fit_from_moments_is_the_least_squares_fit_of_the_whitened_rows(design: DesignMatrix) -> None:
+    solver = solved(design)
+    columns = design.columns
+    noise = fit_noise(columns.target, design.observed, 0.0, TUNING.noise)
     state = State((0, 4, 8), (0.0, 0.0, 0.0))
     fit = solver.fit(state)
     rows, targets = [], []
     for joint, (matrix, index) in enumerate(zip(columns.matrices, columns.index, strict=True)):
-        white = noise.white(matrix, joint, bench.observed, "identify")
+        white = noise.white(matrix, joint, design.observed, "identify")
         own = np.zeros((len(white), len(fit.columns)))
         for place, column in enumerate(fit.columns):
             found = np.flatnonzero(index == column)
@@ -119,24 +119,24 @@ def test_a_fit_from_moments_is_the_least_squares_fit_of_the_whitened_rows(bench:
     assert fit.coefficients[fit.columns] / solver.moments.lengths[fit.columns] == pytest.approx(direct, rel=1e-5)
 
 
-def test_the_gain_of_a_group_is_what_adding_it_raises_the_score_by(bench: DesignMatrix) -> None:
-    solver, state = solved(bench), State((1,), (0.05, 0.05, 0.05))
+def test_the_gain_of_a_group_is_what_adding_it_raises_the_score_by(design: DesignMatrix) -> None:
+    solver, state = solved(design), State((1,), (0.05, 0.05, 0.05))
     gains = solver.gains(state)
     for group in (0, 5, 7):
         raised = solver.fit(state.plus(group)).score - solver.fit(state).score
         assert gains[group] == pytest.approx(raised, abs=1e-3)
 
 
-def test_the_loss_of_a_group_is_what_taking_it_out_changes_the_score_by(bench: DesignMatrix) -> None:
-    solver, state = solved(bench), State((0, 1, 5), (0.05, 0.05, 0.05))
+def test_the_loss_of_a_group_is_what_taking_it_out_changes_the_score_by(design: DesignMatrix) -> None:
+    solver, state = solved(design), State((0, 1, 5), (0.05, 0.05, 0.05))
     losses = solver.losses(solver.fit(state))
     for group in state.groups:
         changed = solver.fit(state.minus(group)).score - solver.fit(state).score
         assert losses[group] == pytest.approx(changed, abs=1e-3)
 
 
-def test_links_of_zero_width_leave_the_base_parameters_at_the_simulation(bench: DesignMatrix) -> None:
-    solver = solved(bench)
+def test_links_of_zero_width_leave_the_base_parameters_at_the_simulation(design: DesignMatrix) -> None:
+    solver = solved(design)
     fit = solver.fit(State((), (0.0, 0.0, 0.0)))
     assert not fit.coefficients.any()
 
@@ -256,14 +256,14 @@ def test_features_of_a_joint_that_carries_nothing_find_nothing(observed: Observe
     assert [structure_of(left[:, 1], 1, each, noise, observed).gain for each in banks] == [0, 0, 0]
 
 
-def test_a_law_that_columns_share_with_it_is_found_beside_them(bench: DesignMatrix) -> None:
+def test_a_law_that_columns_share_with_it_is_found_beside_them(design: DesignMatrix) -> None:
     """Friction columns take a part of a cube of the velocity; what is left resembles the rest of the cube."""
-    observed = bench.observed
+    observed = design.observed
     rng = np.random.default_rng(5)
     cube = filtered(np.concatenate([each.motion.velocity[:, 0] ** 3 for each in observed.signals]), observed)
     torque = np.zeros((observed.rows, 3))
     torque[:, 0] = 0.3 * cube
-    noisy = replace(bench, target=torque + 0.02 * rng.standard_normal(torque.shape))
+    noisy = replace(design, target=torque + 0.02 * rng.standard_normal(torque.shape))
     noise = fit_noise(noisy.target - torque, observed, 0.0, TUNING.noise)
     moments, solver = noisy.solver(noise)
     model = FittedModel(noisy, noise, moments, solver, State(tuple(range(len(solver.groups))), (0.0, 0.0, 0.0)))
@@ -323,10 +323,10 @@ def test_a_direction_that_the_prior_alone_holds_hides_no_other() -> None:
     assert chances[0] < 1e-3
 
 
-def test_a_second_look_adds_what_a_scan_finds_then_and_leaves_what_was_there(bench: DesignMatrix) -> None:
+def test_a_second_look_adds_what_a_scan_finds_then_and_leaves_what_was_there(design: DesignMatrix) -> None:
     families = [family for family in library() if family.effect in ("external_contact", "viscous_friction")]
-    quiet = [np.zeros(each.run.position.shape) for each in bench.observed.signals]
-    first = bench.with_candidates(families, quiet)
+    quiet = [np.zeros(each.run.position.shape) for each in design.observed.signals]
+    first = design.with_candidates(families, quiet)
     assert first.scanned_again(lambda effect: quiet).blocks == first.blocks
     pushed = [each.copy() for each in quiet]
     pushed[0][200:300, 0] = 1.0

@@ -1,4 +1,4 @@
-"""The bench of real arms, on recordings that stand in for them: one page, one table, checks, and settings left out."""
+"""All real arms, on recordings that stand in for them: one page, one table, checks, and settings left out."""
 
 import json
 from collections.abc import Iterator

@@ -14,7 +14,7 @@ from told_recordings import frame, recording_in
 from armlab.cli.main import main
 from armlab.common.errors import InputError
 from armlab.proof.open.real_folders import runs
-from armlab.proof.open.real_folders.all_folders import FolderBench, bench_folders
+from armlab.proof.open.real_folders.all_folders import FolderProof, prove_folders
 from armlab.proof.open.real_folders.errors import error_ratio, measure_errors
 from armlab.proof.open.real_folders.recording_folders import find_folders
 from armlab.recordings.public import LOCAL_COPIES_VARIABLE
@@ -43,7 +43,7 @@ FACTS = {
 
 
 @pytest.fixture
-def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FolderBench:
+def proof(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FolderProof:
     """Three folders, of which one is refused and none can be read, and facts about them."""
     script = tmp_path / "stand_in.py"
     script.write_text(STAND_IN)
@@ -54,13 +54,13 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FolderBench:
         (folder / "recording.yaml").write_text("schema: recording/1\n")
     facts = tmp_path / "facts.yaml"
     facts.write_text(yaml.safe_dump(FACTS))
-    return FolderBench(tmp_path / "recordings", facts, tmp_path / "results", tmp_path / "work", jobs=1)
+    return FolderProof(tmp_path / "recordings", facts, tmp_path / "results", tmp_path / "work", jobs=1)
 
 
-def asked(bench: FolderBench) -> list[str]:
+def asked(proof: FolderProof) -> list[str]:
     """The folders that were diagnosed, one entry a time."""
-    assert bench.root is not None
-    return sorted((bench.root / "asked.txt").read_text().split())
+    assert proof.root is not None
+    return sorted((proof.root / "asked.txt").read_text().split())
 
 
 def test_single_recordings_and_pairs_are_found_at_any_depth(tmp_path: Path) -> None:
@@ -72,8 +72,8 @@ def test_single_recordings_and_pairs_are_found_at_any_depth(tmp_path: Path) -> N
     assert found == {"a": False, "b/deep": False, "pair": True, "half/old": False}
 
 
-def test_a_row_says_what_is_told_and_a_failing_folder_why(bench: FolderBench) -> None:
-    lines = list(bench_folders(bench))
+def test_a_row_says_what_is_told_and_a_failing_folder_why(proof: FolderProof) -> None:
+    lines = list(prove_folders(proof))
     assert any(line.startswith("open: status mismatch, named 1") for line in lines)
     assert "  wrong: never payload@3" in lines
     assert "  no verdict: armlab: link 1 is no body" in lines
@@ -83,31 +83,31 @@ def test_a_row_says_what_is_told_and_a_failing_folder_why(bench: FolderBench) ->
     assert "WRONG 2, extra 0" in singles
 
 
-def test_rows_without_a_licence_stand_on_the_local_page_alone(bench: FolderBench) -> None:
-    list(bench_folders(bench))
-    public = "".join(path.read_text() for path in bench.results.iterdir())
-    local = (bench.work / "folders.md").read_text()
+def test_rows_without_a_licence_stand_on_the_local_page_alone(proof: FolderProof) -> None:
+    list(prove_folders(proof))
+    public = "".join(path.read_text() for path in proof.results.iterdir())
+    local = (proof.work / "folders.md").read_text()
     assert "| open |" in public
     assert "secret" not in public
     assert "2 folders that may be published, of 3" in public
     assert "| secret |" in local
-    assert (bench.work / ".gitignore").read_text() == "*\n"
+    assert (proof.work / ".gitignore").read_text() == "*\n"
 
 
-def test_folders_of_which_nothing_is_known_have_a_row_and_stay_local(bench: FolderBench) -> None:
-    lines = list(bench_folders(FolderBench(bench.root, None, bench.results, bench.work, jobs=1), ["open"]))
+def test_folders_of_which_nothing_is_known_have_a_row_and_stay_local(proof: FolderProof) -> None:
+    lines = list(prove_folders(FolderProof(proof.root, None, proof.results, proof.work, jobs=1), ["open"]))
     assert any(line.startswith("open: status mismatch, contradictions 1, words 2, findings 1") for line in lines)
-    assert not bench.results.exists()
+    assert not proof.results.exists()
 
 
-def test_a_run_goes_on_where_it_stopped_and_asks_again_for_another_recording(bench: FolderBench) -> None:
-    list(bench_folders(bench, ["open"]))
-    assert "1 of 3 folders are done already" in list(bench_folders(bench))
-    assert asked(bench) == ["broken", "open", "secret"]
-    assert bench.root is not None
-    (bench.root / "open" / "run.csv").write_text("t,q1\n")
-    list(bench_folders(bench))
-    assert asked(bench) == ["broken", "open", "open", "secret"]
+def test_a_run_goes_on_where_it_stopped_and_asks_again_for_another_recording(proof: FolderProof) -> None:
+    list(prove_folders(proof, ["open"]))
+    assert "1 of 3 folders are done already" in list(prove_folders(proof))
+    assert asked(proof) == ["broken", "open", "secret"]
+    assert proof.root is not None
+    (proof.root / "open" / "run.csv").write_text("t,q1\n")
+    list(prove_folders(proof))
+    assert asked(proof) == ["broken", "open", "open", "secret"]
 
 
 @pytest.mark.parametrize(
@@ -118,15 +118,15 @@ def test_a_run_goes_on_where_it_stopped_and_asks_again_for_another_recording(ben
     ],
 )
 def test_facts_about_other_folders_are_refused_before_any_diagnosis(
-    bench: FolderBench, change: dict[str, Any], message: str
+    proof: FolderProof, change: dict[str, Any], message: str
 ) -> None:
-    assert bench.facts is not None
-    bench.facts.write_text(yaml.safe_dump({"schema": "facts/1", **change}))
+    assert proof.facts is not None
+    proof.facts.write_text(yaml.safe_dump({"schema": "facts/1", **change}))
     with pytest.raises(InputError) as caught:
-        list(bench_folders(bench))
+        list(prove_folders(proof))
     assert message in str(caught.value)
-    assert bench.root is not None
-    assert not (bench.root / "asked.txt").exists()
+    assert proof.root is not None
+    assert not (proof.root / "asked.txt").exists()
 
 
 def test_twice_the_error_is_a_ratio_of_two_with_no_spread() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from told_recordings import frame, recording_in
 
-from armlab.proof.open.relations.all_relations import bench_relations, relations_page
+from armlab.proof.open.relations.all_relations import check_relations, relations_page
 from armlab.proof.open.relations.relations import NULL_PAIRS, QUICK, RELATIONS, Desk, RelationOutcome, check_relation
 from armlab.proof.open.relations.variants import every_other_second, half, one_run, resampled, rewritten, thinned
 from armlab.recordings.load import load_recording
@@ -73,7 +73,7 @@ def test_outcomes_are_kept_for_the_next_run(tmp_path: Path, monkeypatch: pytest.
 
     monkeypatch.setattr("armlab.proof.open.relations.all_relations.check_relation", answer)
     for _ in range(2):
-        lines = list(bench_relations(tmp_path / "results", tmp_path / "none", [folder], ["arm"]))
+        lines = list(check_relations(tmp_path / "results", tmp_path / "none", [folder], ["arm"]))
     assert asked == list(RELATIONS)
     assert len(lines) == len(RELATIONS) + 2
 
@@ -86,6 +86,6 @@ def test_null_pairs_are_counted_on_a_page_of_their_own(tmp_path: Path, monkeypat
         return RelationOutcome(recording.name, name, answers[name], "")
 
     monkeypatch.setattr("armlab.proof.open.relations.all_relations.check_relation", answer)
-    lines = list(bench_relations(tmp_path / "results", tmp_path / "none", [folder], ["arm"], NULL_PAIRS))
+    lines = list(check_relations(tmp_path / "results", tmp_path / "none", [folder], ["arm"], NULL_PAIRS))
     assert "2 answers, a change is named in 1 (95 % interval 9.45 to 90.5 %)" in lines[-2]
     assert [path.name for path in (tmp_path / "results").glob("*.md")] == ["null-pairs.md"]

@@ -96,7 +96,7 @@ class OracleAnswer:
 
 
 @dataclass(frozen=True, eq=False)
-class _Bench:
+class _Laboratory:
     """Where laws are compared: coarse runs of a case, and rows without what is free.
 
     others: effects beside the one that is asked. motion_known, oracle: know the motion, or have recorded positions;
@@ -142,15 +142,15 @@ def ask_oracle(case: SimulatedCase, least: float) -> Iterator[OracleAnswer]:
 
 def _ask(case: SimulatedCase, number: int) -> OracleAnswer:
     effect, plan = case.hidden[number], case.plan
-    bench = _make_bench(case, number)
-    joints, torque = plan.machine.joints, bench.torque(effect)
-    coarse = max(bench.motion_known.multiple(torque, bench.beside), 1e-150)
+    laboratory = _make_laboratory(case, number)
+    joints, torque = plan.machine.joints, laboratory.torque(effect)
+    coarse = max(laboratory.motion_known.multiple(torque, laboratory.beside), 1e-150)
     scale = case.multiples[number] / coarse  # from the coarse simulation to the recording
-    own = bench.oracle.rows_without_free(torque, bench.beside) * scale
+    own = laboratory.oracle.rows_without_free(torque, laboratory.beside) * scale
     power = float(own @ own)
     seen = detection_power(power, joints)
     rng = plan.stream(f"oracle {number}")
-    rivals = sorted(_distances(bench, effect, own, rng), key=lambda each: each[0])
+    rivals = sorted(_distances(laboratory, effect, own, rng), key=lambda each: each[0])
     better = [float(norm.cdf(each[0] / 2)) for each in rivals]
     distance, law, place = rivals[0]
     return OracleAnswer(
@@ -162,7 +162,7 @@ def _ask(case: SimulatedCase, number: int) -> OracleAnswer:
         outside=effect.is_outside,
         multiple=case.multiples[number],
         multiple_recorded=float(np.sqrt(power / limit_noncentrality(joints))),
-        multiple_away=bench.away.multiple(torque, bench.beside) * scale,
+        multiple_away=laboratory.away.multiple(torque, laboratory.beside) * scale,
         seen=seen,
         rival=law,
         rival_joint=place,
@@ -172,7 +172,7 @@ def _ask(case: SimulatedCase, number: int) -> OracleAnswer:
     )
 
 
-def _make_bench(case: SimulatedCase, number: int) -> _Bench:
+def _make_laboratory(case: SimulatedCase, number: int) -> _Laboratory:
     plan, effect = case.plan, case.hidden[number]
     wanted = [coarse_track(reference_track(plan, at, run)) for at, run in enumerate(plan.runs)]
     tracks = [coarse_track(track) for track in case.tracks]
@@ -184,7 +184,7 @@ def _make_bench(case: SimulatedCase, number: int) -> _Bench:
         for run, track in zip(runs, chosen, strict=True)
     ]
     absorbed = tuple(joint + 1 for joint in absorbed_rotors(plan.machine.arm))
-    return _Bench(
+    return _Laboratory(
         plan=plan,
         controller=controller,
         wanted=wanted,
@@ -199,25 +199,25 @@ def _make_bench(case: SimulatedCase, number: int) -> _Bench:
 
 
 def _distances(
-    bench: _Bench, effect: HiddenEffect, own: Array, rng: np.random.Generator
+    laboratory: _Laboratory, effect: HiddenEffect, own: Array, rng: np.random.Generator
 ) -> Iterator[tuple[float, str, int | None]]:
     """The distance of each other law at each place, with its name and place."""
-    machine = bench.plan.machine
-    peak = np.max([np.abs(run.motor).max(axis=0) for run in bench.runs], axis=0)
+    machine = laboratory.plan.machine
+    peak = np.max([np.abs(run.motor).max(axis=0) for run in laboratory.runs], axis=0)
     places = [(kind, int(joint)) for kind in LAWS for joint in kind.places(machine)]
-    looked = [each for each in (_first_look(bench, effect, own, place, peak, rng) for place in places) if each]
+    looked = [each for each in (_first_look(laboratory, effect, own, place, peak, rng) for place in places) if each]
     looked.sort(key=lambda each: each[0])
     for left, kind, first in looked[:SOUGHT]:
         if kind.where != "link" and not first.has_parts:
-            draws = [first, *_draws(kind, first.joint, bench, peak, rng, DRAWS)]
-            left = min(left, _left_by_best(bench, own, draws, rng))
+            draws = [first, *_draws(kind, first.joint, laboratory, peak, rng, DRAWS)]
+            left = min(left, _left_by_best(laboratory, own, draws, rng))
         yield float(np.sqrt(max(left, 0.0))), first.effect, first.place
     for left, _, first in looked[SOUGHT:]:
         yield float(np.sqrt(max(left, 0.0))), first.effect, first.place
 
 
 def _first_look(
-    bench: _Bench,
+    laboratory: _Laboratory,
     effect: HiddenEffect,
     own: Array,
     place: tuple[type[HiddenEffect], int],
@@ -229,36 +229,36 @@ def _first_look(
     Nor is there a rival where every draw runs away in the coarse simulation.
     """
     kind, joint = place
-    first, *more = _draws(kind, joint, bench, peak, rng, LINK_DRAWS if kind.where == "link" else LOOKS)
-    if _is_right(first, effect, bench):
+    first, *more = _draws(kind, joint, laboratory, peak, rng, LINK_DRAWS if kind.where == "link" else LOOKS)
+    if _is_right(first, effect, laboratory):
         return None
     if kind.where == "link":
-        return _left_by_all(own, [bench.rows(each) for each in (first, *more)]), kind, first
+        return _left_by_all(own, [laboratory.rows(each) for each in (first, *more)]), kind, first
     if first.has_parts:
-        return _look_at_parts(own, bench, (first, *more))
-    left = [_left_by(own, bench, each) for each in (first, *more)]
+        return _look_at_parts(own, laboratory, (first, *more))
+    left = [_left_by(own, laboratory, each) for each in (first, *more)]
     return min(left), kind, (first, *more)[int(np.argmin(left))]
 
 
 def _look_at_parts(
-    own: Array, bench: _Bench, draws: Sequence[HiddenEffect]
+    own: Array, laboratory: _Laboratory, draws: Sequence[HiddenEffect]
 ) -> tuple[float, type[HiddenEffect], HiddenEffect] | None:
     """What the first draw leaves that does not run away in the coarse simulation; None where all do."""
     for each in draws:
         try:
-            return _left_by(own, bench, each), type(each), each
+            return _left_by(own, laboratory, each), type(each), each
         except FloatingPointError:
             continue
     return None
 
 
 def _draws(
-    kind: type[HiddenEffect], joint: int, bench: _Bench, peak: Array, rng: np.random.Generator, count: int
+    kind: type[HiddenEffect], joint: int, laboratory: _Laboratory, peak: Array, rng: np.random.Generator, count: int
 ) -> list[HiddenEffect]:
-    return [kind.draw(rng, bench.plan.machine, joint).with_peak_torque(peak) for _ in range(count)]
+    return [kind.draw(rng, laboratory.plan.machine, joint).with_peak_torque(peak) for _ in range(count)]
 
 
-def _is_right(other: HiddenEffect, effect: HiddenEffect, bench: _Bench) -> bool:
+def _is_right(other: HiddenEffect, effect: HiddenEffect, laboratory: _Laboratory) -> bool:
     """Whether another law has the right name, or one that the score counts as right, or holds the right one.
 
     A law that holds the right one as a limit fits as well, and has more numbers: the simpler one is preferred. Of an
@@ -271,7 +271,7 @@ def _is_right(other: HiddenEffect, effect: HiddenEffect, bench: _Bench) -> bool:
     ):
         return True
     names = other.effect, other.place, effect.effect, effect.place
-    return is_indistinguishable(*names, bench.plan.machine.joints, bench.absorbed_rotors)
+    return is_indistinguishable(*names, laboratory.plan.machine.joints, laboratory.absorbed_rotors)
 
 
 def _holds(other: type[HiddenEffect], effect: type[HiddenEffect]) -> bool:
@@ -279,13 +279,15 @@ def _holds(other: type[HiddenEffect], effect: type[HiddenEffect]) -> bool:
     return effect.effect in (*CONTAINED_EFFECTS.get(other.effect, ()), *LIMITS.get(other.effect, ()))
 
 
-def _left_by_best(bench: _Bench, own: Array, draws: Sequence[HiddenEffect], rng: np.random.Generator) -> float:
+def _left_by_best(
+    laboratory: _Laboratory, own: Array, draws: Sequence[HiddenEffect], rng: np.random.Generator
+) -> float:
     """What the best of some laws leaves, and the best of steps about it."""
-    tried = [(_left_by(own, bench, each), each) for each in draws]
+    tried = [(_left_by(own, laboratory, each), each) for each in draws]
     for _ in range(ROUNDS):
         left, best = min(tried, key=lambda each: each[0])
         tried = [(left, best)]
-        tried += [(_left_by(own, bench, each), each) for each in (_stepped(best, rng) for _ in range(STEPS))]
+        tried += [(_left_by(own, laboratory, each), each) for each in (_stepped(best, rng) for _ in range(STEPS))]
     return min(each[0] for each in tried)
 
 
@@ -298,8 +300,8 @@ def _stepped(effect: HiddenEffect, rng: np.random.Generator) -> HiddenEffect:
     return replace(effect, shape=moved)
 
 
-def _left_by(own: Array, bench: _Bench, other: HiddenEffect) -> float:
-    rows = bench.rows(other)
+def _left_by(own: Array, laboratory: _Laboratory, other: HiddenEffect) -> float:
+    rows = laboratory.rows(other)
     power, shared = float(rows @ rows), float(own @ rows)
     if other.takes_energy:
         shared = max(shared, 0.0)

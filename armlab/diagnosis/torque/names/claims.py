@@ -110,16 +110,16 @@ def _link_claims(
     model: FittedModel, wide: ShapedFit, links: Mapping[int, Evidence], names: Mapping[int, Weighed]
 ) -> list[Claim]:
     """One claim for each link that is off: its ten parameters, given what the joints feel of all links."""
-    bench, widths = model.design, model.fit.state.widths
-    if not links or bench.prior is None or widths is None:
+    design, widths = model.design, model.fit.state.widths
+    if not links or design.prior is None or widths is None:
         return []
     base, covariance = wide.base()
-    mean, spread = bench.prior.deviations(widths, base, covariance)
+    mean, spread = design.prior.deviations(widths, base, covariance)
     claims = []
     for link, evidence in links.items():
         place = slice(10 * link, 10 * link + 10)
-        added = is_outlying(widths, link, bench.settings.tuning.claims.outlying_factor)
-        law = link_law(bench.simulation.arm, link + 1, mean[place], spread[place, place], added=added)
+        added = is_outlying(widths, link, design.settings.tuning.claims.outlying_factor)
+        law = link_law(design.simulation.arm, link + 1, mean[place], spread[place, place], added=added)
         if law is not None:  # else these data tell of something that is no link
             claim = _link_claim(model, wide.factor, law, mean[place], spread[place, place], evidence)
             claims.append(replace(claim, weighed=names[link]))
@@ -130,13 +130,13 @@ def _link_claim(
     model: FittedModel, factor: float, law: LinkLaw, mean: Array, spread: Array, evidence: Evidence
 ) -> Claim:
     """The claim about one link. mean (10,), spread (10, 10): what it has more than its simulation."""
-    bench, candidate = model.design, law.candidate
+    design, candidate = model.design, law.candidate
     link = candidate.joints[0]
-    turn = np.column_stack([felt_values(bench.simulation.arm, link, unit) for unit in np.eye(10)])
+    turn = np.column_stack([felt_values(design.simulation.arm, link, unit) for unit in np.eye(10)])
     coefficients, covariance = turn @ mean, turn @ spread @ turn.T
-    change, torque = np.zeros(10 * len(bench.simulation.arm)), np.zeros(model.moments.size)
+    change, torque = np.zeros(10 * len(design.simulation.arm)), np.zeros(model.moments.size)
     change[10 * link - 10 : 10 * link] = mean
-    torque[: len(bench.base)] = bench.base.grouping @ change
+    torque[: len(design.base)] = design.base.grouping @ change
     rivals = tuple(Rival(each, link, (), True) for each in law.rivals)
     return Claim(
         effect=candidate.effect,

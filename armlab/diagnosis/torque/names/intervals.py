@@ -52,8 +52,8 @@ def _places(place: slice | None) -> range:
 
 def extend_with_shapes(model: FittedModel) -> ShapedFit:
     """Adds the torque's derivatives by the shapes to the columns of the fit."""
-    bench, fit = model.design, model.fit
-    extra = {joint: np.empty((bench.observed.rows, 0)) for joint in range(bench.observed.joints)}
+    design, fit = model.design, model.fit
+    extra = {joint: np.empty((design.observed.rows, 0)) for joint in range(design.observed.joints)}
     places, start, bounds = {}, len(fit.inverse), list[tuple[float, float]]()
     for group in fit.state.groups:
         candidate = model.candidate(group)
@@ -62,15 +62,15 @@ def extend_with_shapes(model: FittedModel) -> ShapedFit:
             continue
         slopes = [_shape_derivative(model, group, which) for which in range(count)]
         for joint in extra:
-            own = np.zeros((bench.observed.rows, count))
+            own = np.zeros((design.observed.rows, count))
             if joint in candidate.rows:
                 own = np.column_stack([slope[:, candidate.rows.index(joint)] for slope in slopes])
             extra[joint] = np.hstack([extra[joint], own])
         places[group] = slice(start, start + count)
         bounds += candidate.bounds
         start += count
-    settings, lengths = bench.settings, model.moments.lengths
-    rows = whitened_rows(model.columns, extra, fit, lengths, model.noise, bench.observed, settings.tuning.blocks)
+    settings, lengths = design.settings, model.moments.lengths
+    rows = whitened_rows(model.columns, extra, fit, lengths, model.noise, design.observed, settings.tuning.blocks)
     own = np.sum([np.sum(design[:, len(fit.inverse) :] ** 2, axis=0) for design in rows.designs], axis=0)
     anywhere = np.array([12 / (high - low) ** 2 for low, high in bounds])  # of a number anywhere in its bounds
     shapes = np.sqrt(own + anywhere)

@@ -1,1 +1,1 @@
-"""One bench of real arms: identification and diagnosis of the public recordings, judged alike on the same runs."""
+"""All real arms: identification and diagnosis of the public recordings, judged alike on the same runs."""

@@ -1,4 +1,4 @@
-"""The page and the table of the bench: `arms.md` and `arms.csv`."""
+"""The page and the table of all arms: `arms.md` and `arms.csv`."""
 
 from collections.abc import Iterator, Sequence
 from io import StringIO

@@ -26,7 +26,7 @@ IGNORED = "*\n"  # .gitignore of the work folder: nothing in it is committed
 
 
 @dataclass(frozen=True)
-class FolderBench:
+class FolderProof:
     """root: the folder below which recordings are, None where none is named. facts: a facts file, None without.
 
     results: folder of the pages that may be published. work: of verdicts, and of the page of all folders.
@@ -53,7 +53,7 @@ class FolderBench:
         return facts
 
 
-def bench_folders(settings: FolderBench, only: Sequence[str] = ()) -> Iterator[str]:
+def prove_folders(settings: FolderProof, only: Sequence[str] = ()) -> Iterator[str]:
     """Lines on each folder, the totals, and what is written; an interrupted run continues.
 
     only: names of folders, all if it is empty. Raises InputError for a wrong facts file and unknown names.
@@ -117,7 +117,7 @@ def _score(known: SingleFacts | PairFacts, verdict: ToldVerdict | None, facts: F
     return score_pair(known, verdict, facts)
 
 
-def _write(rows: Sequence[FolderRow], settings: FolderBench) -> Iterator[str]:
+def _write(rows: Sequence[FolderRow], settings: FolderProof) -> Iterator[str]:
     """The pages: licensed folders among the results, all of them in the work folder."""
     licensed = [each for each in rows if each.licensed]
     if licensed:

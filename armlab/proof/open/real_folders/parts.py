@@ -7,13 +7,13 @@ from pathlib import Path
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
 from armlab.proof.open.real_arms.all_arms import bench_real_arms
-from armlab.proof.open.real_folders.all_folders import FolderBench, bench_folders
+from armlab.proof.open.real_folders.all_folders import FolderProof, prove_folders
 from armlab.proof.open.real_identification.identify_recording import RECIPES
 from armlab.recordings.public import LOCAL_COPIES_VARIABLE
 
 
 @dataclass(frozen=True)
-class PublicBench:
+class PublicProof:
     """Where the public recordings and their results are; fields as in `bench_real_arms`."""
 
     results: Path
@@ -21,9 +21,9 @@ class PublicBench:
     peers: Path | None
 
 
-def bench_real(
-    folders: FolderBench | None,
-    public: PublicBench | None,
+def prove_on_real_arms(
+    folders: FolderProof | None,
+    public: PublicProof | None,
     only: Sequence[str] = (),
     progress: Callable[[str], None] = lambda message: None,
 ) -> Iterator[str]:
@@ -41,13 +41,13 @@ def bench_real(
     if folders is not None and not own:
         yield f"no recording folders: {LOCAL_COPIES_VARIABLE} names none"
     elif folders is not None and (not only or set(only) & set(own)):
-        yield from bench_folders(folders, [name for name in only if name in own])
+        yield from prove_folders(folders, [name for name in only if name in own])
     if public is not None and (not only or set(only) & set(arms)):
         chosen = [name for name in only if name in arms]
         yield from bench_real_arms(public.results, public.recordings, chosen, public.peers, progress)
 
 
-def _folder_names(folders: FolderBench, optional: bool) -> tuple[str, ...]:
+def _folder_names(folders: FolderProof, optional: bool) -> tuple[str, ...]:
     """Names of the folders; none where there are none and they are `optional`, else InputError."""
     try:
         return tuple(each.name for each in folders.find())

@@ -24,7 +24,7 @@ PAGE, NULL_PAIRS_PAGE = "relations.md", "null-pairs.md"
 ANSWERS = {True: "held", False: "**broken**", None: "no answer"}
 
 
-def bench_relations(
+def check_relations(
     results: Path,
     recordings: Path,
     folders: Sequence[Path] = (),

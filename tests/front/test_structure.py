@@ -1,0 +1,31 @@
+"""The layout of the source: names that a reader can tell apart."""
+
+import ast
+from pathlib import Path
+
+from tools.structure import longest_chain, names_twice, read_sources
+
+TWICE = {"armlab/diagnosis: tuning.py"}  # the numbers of both engines, those of motion below the common settings
+
+
+def test_no_class_name_and_no_file_name_stands_twice_in_a_package() -> None:
+    sources = read_sources(Path(__file__).parents[2])
+    found = names_twice({path: ast.parse(text) for path, text in sources.items()})
+    assert {name: paths for name, paths in found.items() if name not in TWICE} == {}
+    assert found.keys() >= TWICE
+
+
+def test_a_name_is_found_where_it_stands_twice() -> None:
+    one, other = Path("armlab/proof/a/page.py"), Path("armlab/proof/b/page.py")
+    elsewhere = Path("armlab/report/plan.py")
+    trees = {one: ast.parse("class Plan: ..."), other: ast.parse(""), elsewhere: ast.parse("class Plan: ...")}
+    assert names_twice(trees) == {"armlab/proof: page.py": [one, other]}
+    assert names_twice(trees | {other: ast.parse("class Plan: ...")}).keys() == {
+        "armlab/proof: page.py",
+        "armlab/proof: Plan",
+    }
+
+
+def test_the_longest_chain_counts_modules_of_a_package() -> None:
+    importers = {"a.low": {"a.middle", "a.high"}, "a.middle": {"a.high"}, "b.other": {"a.low"}}
+    assert longest_chain(importers, "a.") == ["a.high", "a.middle", "a.low"]
