@@ -21,7 +21,7 @@ from armlab.effects.drive import TorqueOffset
 from armlab.identification.components import usual_components
 from armlab.identification.covariance import uncertainty
 from armlab.identification.estimators.least_squares import WeightedLeastSquares, joint_weights
-from armlab.identification.estimators.physical import TYPICAL_BODY, load_cvxpy
+from armlab.identification.estimators.physical import TYPICAL_BODY, load_cvxpy, minimise
 from armlab.identification.priors import point_mass
 from armlab.identification.regression import Regression, regression, require_rows, signals_of, suggested_cutoff
 from armlab.identification.selection import counterbalance_groups
@@ -56,10 +56,7 @@ def nearest_physical_load(data: Regression, free: Array, basis: Array) -> Array:
     body = sum(scaled[index] * shapes[index] / lengths[index] for index in range(len(free)))
     size = max(float(np.linalg.norm(target)), 1e-300)
     error = cp.sum_squares((block / lengths) @ scaled - target / size)
-    task = cp.Problem(cp.Minimize(error), [body >> 0])
-    task.solve(solver=cp.CLARABEL)
-    if task.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
-        raise RuntimeError(f"no load that can exist was found: the solver says '{task.status}'")
+    minimise(cp, error, [body >> 0], "load that can exist")
     return np.asarray(size * scaled.value / lengths)
 
 

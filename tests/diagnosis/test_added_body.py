@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from effect_scenes import scene_of
-from told_recordings import ARM, PAYLOAD, frame, motion_at, recording_in
+from small_recordings import ARM, PAYLOAD, frame, motion_at, recording_in
 
 from armlab.diagnosis.result import Claim
 from armlab.diagnosis.torque.diagnose import diagnose

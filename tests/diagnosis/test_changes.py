@@ -19,7 +19,7 @@ from public_copies import needs_copies
 from refusals import refusal
 from scipy.signal import savgol_filter
 from shipped_schemas import check_against_schema
-from told_recordings import ARM, VISCOUS, frame, motion_at, recording_in
+from small_recordings import ARM, VISCOUS, frame, motion_at, recording_in
 
 from armlab.cli.main import main
 from armlab.common.statistics import adjust_by_holm

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
 from refusals import refusal
-from told_recordings import ARM, frame, motion_at, recording_in
+from small_recordings import ARM, frame, motion_at, recording_in
 
 from armlab.cli.main import main
 from armlab.diagnosis.next.confusability import (

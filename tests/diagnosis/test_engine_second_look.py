@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from told_recordings import POSSIBLE_PAYLOAD, frame, recording_in
+from small_recordings import POSSIBLE_PAYLOAD, frame, recording_in
 
 from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.identification.model_file import read_model

@@ -6,7 +6,7 @@ from pathlib import Path
 import engine_cases as cases
 import numpy as np
 import pytest
-from told_recordings import frame, recording_in
+from small_recordings import frame, recording_in
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.formats import VerdictFile

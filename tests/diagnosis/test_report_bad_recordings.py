@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 import yaml
 from click.testing import CliRunner
-from told_recordings import POSITION, TORQUE, frame, recording_in
+from small_recordings import POSITION, TORQUE, frame, recording_in
 
 from armlab.cli.main import main
 from armlab.recordings.load import load_recording

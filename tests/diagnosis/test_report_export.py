@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 from numpy.testing import assert_allclose
-from told_recordings import TORQUE, frame, motion_at, recording_in
+from small_recordings import TORQUE, frame, motion_at, recording_in
 
 from armlab.common.errors import InputError
 from armlab.diagnosis.torque.diagnose import diagnose

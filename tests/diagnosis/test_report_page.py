@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import yaml
 from markupsafe import escape
-from told_recordings import frame, recording_in
+from small_recordings import frame, recording_in
 
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts

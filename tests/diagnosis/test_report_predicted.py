@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from told_recordings import frame, recording_in
+from small_recordings import frame, recording_in
 
 from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.recordings.load import load_recording

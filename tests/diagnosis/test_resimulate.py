@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from told_recordings import ARM, frame, recording_in
+from small_recordings import ARM, frame, recording_in
 
 from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.recordings.load import load_recording

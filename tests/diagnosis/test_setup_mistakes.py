@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from told_recordings import ARM, POSITION, frame, recording_in
+from small_recordings import ARM, POSITION, frame, recording_in
 
 from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.proof.blind.setup.mistakes import Injected, inject

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from servo_arms import write_recording
-from told_recordings import frame, recording_in
+from small_recordings import frame, recording_in
 
 from armlab.cli.main import main
 from armlab.common.arrays import Array

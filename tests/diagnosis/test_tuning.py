@@ -7,7 +7,7 @@ from pathlib import Path
 import engine_cases as cases
 import pytest
 from click.testing import CliRunner
-from told_recordings import frame, recording_in
+from small_recordings import frame, recording_in
 
 from armlab.cli.main import main
 from armlab.common.errors import InputError

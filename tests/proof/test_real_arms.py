@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 from refusals import refusal
-from told_recordings import ARM, frame, recording_in
+from small_recordings import ARM, frame, recording_in
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.result import Diagnosis

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from told_recordings import ARM, COULOMB, PAYLOAD, VISCOUS, motion_at
-from told_reference import reference_in
+from small_recordings import ARM, COULOMB, PAYLOAD, VISCOUS, motion_at
+from small_reference import reference_in
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.torque.rows.simulation import Simulation

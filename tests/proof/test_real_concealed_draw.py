@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from told_recordings import ARM, motion_at
-from told_reference import reference_in
+from small_recordings import ARM, motion_at
+from small_reference import reference_in
 
 from armlab.common.arrays import Array
 from armlab.proof.open.real_concealed.conceal import (

@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
-from told_recordings import frame, recording_in
-from told_reference import reference_in
+from small_recordings import frame, recording_in
+from small_reference import reference_in
 
 from armlab.cli.main import main
 from armlab.common.errors import InputError

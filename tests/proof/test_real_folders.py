@@ -9,7 +9,7 @@ import pytest
 import yaml
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
-from told_recordings import frame, recording_in
+from small_recordings import frame, recording_in
 
 from armlab.cli.main import main
 from armlab.common.errors import InputError

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from told_recordings import frame, recording_in
+from small_recordings import frame, recording_in
 
 from armlab.proof.open.relations.all_relations import check_relations, relations_page
 from armlab.proof.open.relations.relations import NULL_PAIRS, QUICK, RELATIONS, Desk, RelationOutcome, check_relation

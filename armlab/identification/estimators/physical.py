@@ -27,7 +27,7 @@ from armlab.identification.priors import NO_PULL, Pull, nominal_prior, nominal_r
 from armlab.identification.regression import Regression
 from armlab.identification.structure import Structure
 from problem.motion import Motion
-from problem.pseudo_inertia import pseudo_inertia_basis, pseudo_inertias, regular_nominal
+from problem.pseudo_inertia import pseudo_inertia_basis, regular_nominal
 
 SPEED_SHARES = np.geomspace(0.01, 1, 12)  # of the fastest
 
@@ -100,7 +100,7 @@ class PhysicalLeastSquares:
     def _solve(self, data: Regression) -> tuple[Array, Array]:
         cp = load_cvxpy()
         lengths = column_lengths(data.matrix)
-        triangle = _qr_triangle(np.column_stack([data.matrix / lengths, data.torque]))
+        triangle = np.linalg.qr(np.column_stack([data.matrix / lengths, data.torque]))[1]
         size, base = self.structure.size, self.structure.base
         links = [cp.Variable((4, 4), PSD=True) for _ in range(len(self.structure.arm))]
         scales = self._scales()
@@ -121,10 +121,7 @@ class PhysicalLeastSquares:
         rows = dissipation_rows(self.structure, self.fastest)
         if len(rows):
             conditions.append((rows / np.abs(rows).max(axis=1, keepdims=True)) @ values >= 0)
-        task = cp.Problem(cp.Minimize(error + pull), conditions)
-        task.solve(solver=cp.CLARABEL)
-        if task.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
-            raise RuntimeError(f"no physically consistent parameters found: the solver says '{task.status}'")
+        minimise(cp, error + pull, conditions, "physically consistent parameters")
         return np.asarray(inertial.value), np.asarray(values.value)
 
     def _scales(self) -> Array:
@@ -141,21 +138,12 @@ class PhysicalLeastSquares:
         return (bodies + sum(cp.square(off) for off in rotors)) / (self.pull.size if nominal else WEAK_TOLERANCE) ** 2
 
 
-def _qr_triangle(matrix: Array) -> Array:
-    return np.asarray(np.linalg.qr(matrix)[1])
-
-
 def _inertial_parameters(cp: Any, link: Any, scale: Array) -> Any:
     """Ten parameters, linear in the scaled pseudo-inertia."""
     gram = np.einsum("iab,jab->ij", pseudo_inertia_basis(), pseudo_inertia_basis())
     dual = np.einsum("ij,jab->iab", np.linalg.inv(gram), pseudo_inertia_basis())
     turned = np.einsum("ab,iac,cd->ibd", scale, dual, scale)
     return turned.reshape(10, 16) @ cp.vec(link, order="C")
-
-
-def is_physical(parameters: Array, tolerance: float = 0.0) -> bool:
-    """True if every link (10 * joints,) has a pseudo-inertia without negative eigenvalues."""
-    return bool(np.linalg.eigvalsh(pseudo_inertias(parameters)).min() >= -tolerance)
 
 
 def load_cvxpy() -> Any:
@@ -165,3 +153,11 @@ def load_cvxpy() -> Any:
     except ImportError:
         raise InputError("physically consistent parameters need CVXPY: pip install 'armlab[identify]'") from None
     return cvxpy
+
+
+def minimise(cp: Any, objective: Any, conditions: list[Any], sought: str) -> None:
+    """Solves a convex problem: the variables hold the solution. RuntimeError where the solver finds none."""
+    task = cp.Problem(cp.Minimize(objective), conditions)
+    task.solve(solver=cp.CLARABEL)
+    if task.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
+        raise RuntimeError(f"no {sought} found: the solver says '{task.status}'")

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from told_recordings import frame, recording_in
+from small_recordings import frame, recording_in
 
 from armlab.effects.friction import CoulombFriction, ViscousFriction
 from armlab.identification.components import every_joint
