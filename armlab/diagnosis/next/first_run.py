@@ -9,7 +9,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.next.moments import DesignMoments, Index
-from armlab.diagnosis.next.question import RivalColumns
+from armlab.diagnosis.next.question import Layout
 from armlab.diagnosis.next.sampling import Sampling, kept_columns
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.rows.data import Observed, observe
@@ -62,7 +62,7 @@ class FirstRun:
         """Share of one more run from which a diagnosis will learn: where no run validates, stretches of all do."""
         return 2 / 3 if self.observed.held_out_blocks else 1.0
 
-    def columns(self, layout: RivalColumns) -> Array:
+    def columns(self, layout: Layout) -> Array:
         """Columns of a layout at the kept rows, (rows, joints, columns)."""
         pairs = zip(self.scenes, self.observed.signals, strict=True)
         return np.concatenate(

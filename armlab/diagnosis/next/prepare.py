@@ -13,9 +13,9 @@ from armlab.common.errors import InputError
 from armlab.diagnosis.next.first_run import FirstRun, FoundEffect, PresentModel, observe_first_run
 from armlab.diagnosis.next.moments import DesignMoments, Index, empty_moments
 from armlab.diagnosis.next.question import (
+    Layout,
     Name,
     Question,
-    RivalColumns,
     build_layout,
     inseparable_rivals,
 )
@@ -58,7 +58,7 @@ class PreparedQuestions:
     """
 
     present: PresentModel
-    layout: RivalColumns
+    layout: Layout
     questions: tuple[Question, ...]
     sampling: Sampling
     seen: DesignMoments
@@ -131,7 +131,7 @@ class _Preparation:
     present: PresentModel
     parts: dict[Name, FoundEffect]
     laws: dict[Name, list[Candidate]]
-    layout: RivalColumns
+    layout: Layout
     links: LinkKnowledge
     first: FirstRun | None
     rich: list[Scene]

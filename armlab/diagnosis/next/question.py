@@ -140,7 +140,7 @@ class Question:
 
 
 @dataclass(frozen=True, eq=False)
-class RivalColumns:
+class Layout:
     """All columns that matter: base parameters, then candidates. prior: precision that is known beforehand."""
 
     base: BaseParameters
@@ -164,7 +164,7 @@ class RivalColumns:
         return DesignMoments(rows.T @ rows, np.zeros(self.size))
 
 
-def build_layout(base: BaseParameters, candidates: list[Candidate], scene: Scene, prior: Array) -> RivalColumns:
+def build_layout(base: BaseParameters, candidates: list[Candidate], scene: Scene, prior: Array) -> Layout:
     """Places of all candidates, each once. prior: (base, base), precision of the base parameters."""
     unique = list(dict.fromkeys(candidates))
     places, at = [], len(base)
@@ -174,7 +174,7 @@ def build_layout(base: BaseParameters, candidates: list[Candidate], scene: Scene
         at += count
     whole = np.zeros((at, at))
     whole[: len(base), : len(base)] = prior
-    return RivalColumns(base, tuple(unique), tuple(places), whole)
+    return Layout(base, tuple(unique), tuple(places), whole)
 
 
 def is_in_free_links(name: Name, free: Index) -> bool:

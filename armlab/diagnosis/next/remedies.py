@@ -13,8 +13,8 @@ from armlab.diagnosis.next.moments import Index
 from armlab.diagnosis.next.prepare import PreparedQuestions
 from armlab.diagnosis.next.question import (
     CLEAR_SEPARATION,
+    Layout,
     Question,
-    RivalColumns,
     RivalLaw,
     build_layout,
     inseparable_rivals,
@@ -95,7 +95,7 @@ def _tilt_base(arm: Arm) -> Arm:
     return replace(arm, gravity=(x, y, z))
 
 
-def _rival_in_layout(rival: RivalLaw, layout: RivalColumns) -> RivalLaw:
+def _rival_in_layout(rival: RivalLaw, layout: Layout) -> RivalLaw:
     return replace(rival, laws=tuple(replace(law, columns=layout.indices_of(law.candidate)) for law in rival.laws))
 
 

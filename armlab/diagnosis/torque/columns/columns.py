@@ -127,7 +127,6 @@ class Moments:
 
     The last row and column belong to the torque, which is not scaled. lengths: (size,), of the columns. heldout: per
     joint (own + 1, own + 1) of the validation rows, in the same scale. rows: whitened identification rows a joint.
-    heldout_rows: those of validation.
     """
 
     gram: Array
@@ -135,7 +134,6 @@ class Moments:
     heldout: tuple[Array, ...]
     index: tuple[NDArray[np.intp], ...]
     rows: tuple[int, ...]
-    heldout_rows: tuple[int, ...]
 
     @property
     def size(self) -> int:
@@ -161,19 +159,17 @@ class Moments:
 def compute_moments(columns: Columns, noise: Noise, observed: Observed) -> Moments:
     """Whitens all columns and multiplies them."""
     gram = np.zeros((columns.size + 1, columns.size + 1))
-    heldout, rows, held_rows = [], [], []
+    heldout, rows = [], []
     for joint, (matrix, index) in enumerate(zip(columns.matrices, columns.index, strict=True)):
         identify = _gram(noise.white(matrix, joint, observed, "identify"))
         gram[np.ix_(index, index)] += identify[0]
-        validate = _gram(noise.white(matrix, joint, observed, "validate"))
-        heldout.append(validate[0])
+        heldout.append(_gram(noise.white(matrix, joint, observed, "validate"))[0])
         rows.append(identify[1])
-        held_rows.append(validate[1])
     lengths = np.sqrt(np.diag(gram)[:-1])
     scale = np.append(np.where(lengths > 0, lengths, 1.0), 1.0)
     gram /= np.outer(scale, scale)
     scaled = tuple(each / np.outer(scale[own], scale[own]) for each, own in zip(heldout, columns.index, strict=True))
-    return Moments(gram, scale[:-1], scaled, columns.index, tuple(rows), tuple(held_rows))
+    return Moments(gram, scale[:-1], scaled, columns.index, tuple(rows))
 
 
 def _gram(white: Array) -> tuple[Array, int]:

@@ -16,8 +16,7 @@ from armlab.proof.blind.plan import RunPlan, random_stream
 from problem.arm import Arm
 
 FieldKind = Literal["null", "hidden", "mistake", "pair null", "pair changed"]
-LARGE_SHARE = 0.48  # of the cases: more than three joints, or more than LARGE_LENGTH_S
-LARGE_LENGTH_S = 20.0
+LARGE_SHARE = 0.48  # of the cases: more than three joints, or more than 20 s
 MIN_SAMPLES = 150  # of a run: who records slowly records longer
 
 

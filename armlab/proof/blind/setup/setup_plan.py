@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -22,7 +22,6 @@ PUBLIC = ("kuka-kr300", "emps", "staubli-tx40", "unisa-ur10", "unisa-panda")
 KIND_CYCLE: tuple[Kind, ...] = ("alone", "alone", "pair", "beside physics")
 NULL_CYCLE: tuple[Kind, ...] = ("none", "near miss", "none")
 MAX_DRAWS = 60
-SOURCES: tuple[Source, ...] = get_args(Source)
 
 
 @dataclass(frozen=True)
