@@ -17,7 +17,7 @@ from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.torque.rows.simulation import read_simulation
 from armlab.effects.parameters import ParameterValue
 from armlab.proof.open.real_arms import checks, leave_one_out
-from armlab.proof.open.real_arms.all_arms import bench_real_arms
+from armlab.proof.open.real_arms.all_arms import prove_on_public_arms
 from armlab.proof.open.real_arms.checks import level_check, mass_agreement
 from armlab.proof.open.real_arms.direct_reading import DirectLevel, direct_levels
 from armlab.proof.open.real_arms.judged_run import Percent, common_cutoff, judged_run
@@ -65,7 +65,7 @@ def quick_recipes() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def results(recordings: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
     folder = tmp_path_factory.mktemp("results")
-    return folder, list(bench_real_arms(folder, recordings, ("kuka-kr300",)))
+    return folder, list(prove_on_public_arms(folder, recordings, ("kuka-kr300",)))
 
 
 def test_the_table_has_a_line_for_each_baseline_and_run_with_every_model(results: tuple[Path, list[str]]) -> None:
@@ -108,7 +108,7 @@ def test_every_look_at_a_run_that_validates_is_logged(results: tuple[Path, list[
 
 
 def test_an_unknown_recording_is_refused_before_anything_is_done(tmp_path: Path) -> None:
-    message = refusal(lambda: list(bench_real_arms(tmp_path / "results", tmp_path, ("kuka",))))
+    message = refusal(lambda: list(prove_on_public_arms(tmp_path / "results", tmp_path, ("kuka",))))
     assert "unknown recording 'kuka'" in message
     assert not (tmp_path / "results").exists()
 

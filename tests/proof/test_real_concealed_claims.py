@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from armlab.diagnosis.result import Weighed, WeighedName
 from armlab.proof.open.real_concealed.at_random import RandomStudy, random_tables
-from armlab.proof.open.real_concealed.claims import DrawnVerdict, judge_drawn
+from armlab.proof.open.real_concealed.claims import DrawnVerdict, LabelledFinding, judge_drawn, label_weighed
 from armlab.proof.open.real_concealed.conceal import SoughtEffect
 from armlab.proof.open.real_concealed.concealed_case import Case, Disturbance
 from armlab.proof.open.real_concealed.draw import DrawnCase
@@ -15,7 +15,6 @@ from armlab.proof.open.real_concealed.examine import (
     ReportedFinding,
     RivalName,
 )
-from armlab.proof.open.real_concealed.labels import LabelledFinding, label_weighed
 
 SPRING = SoughtEffect("spring at joint 2", ("cable_stiffness",), (2,), {}, ("gravity_compensator",))
 CASE = DrawnCase(Case("told", (), Disturbance("cable_stiffness", 2, 2.0, "N m/rad")), 3.5)

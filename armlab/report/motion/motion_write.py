@@ -8,13 +8,20 @@ from armlab.common.documents import ResultLines
 from armlab.common.files import write_texts
 from armlab.common.report.printed_table import table_files
 from armlab.diagnosis.motion.diagnose_motion import diagnose_motion
+from armlab.diagnosis.motion.motion_result import MotionDiagnosis
 from armlab.diagnosis.tuning import Tuning, change_tuning, parse_change
 from armlab.recordings.motion import load_motion_recording
 from armlab.report.motion.motion_page import joint_table, motion_page
 from armlab.report.motion.motion_verdict import make_motion_verdict, motion_texts
 from armlab.report.motion.motion_words import motion_lines
-from armlab.report.motion.signals import motion_tracks
-from armlab.report.signals_file import SIGNALS_FILE, check_signals_writer, signals_content
+from armlab.report.signals_file import (
+    SIGNALS_FILE,
+    Track,
+    check_signals_writer,
+    recorded_track,
+    signals_content,
+    topic_names,
+)
 from armlab.report.verdict_files import check_can_be_written
 
 
@@ -61,3 +68,23 @@ def diagnose_motion_recording(
     if diagnosis.seconds:
         yield f"diagnosed in {diagnosis.seconds:.1f} s once read"
     return make_motion_verdict(diagnosis).content() | {"files": written}
+
+
+def motion_tracks(diagnosis: MotionDiagnosis) -> list[Track]:
+    """The topics of `signals.mcap` where a recording has no torque.
+
+    `recorded` and `commanded`: as read, on the joint side. Of what is held out, from the same first state: `simulated`,
+    the replay of the simulation as given (where its controller is known), and `corrected`, that with what was found.
+    """
+    runs = diagnosis.recording.runs
+    names = topic_names(runs)
+    tracks = []
+    for run in runs:
+        tracks.append(recorded_track(run, names[run.name]))
+        commands = (run.reference_position, run.reference_velocity)
+        tracks.append(Track(f"/{names[run.name]}/commanded", run.time, *commands))
+    replays = {"simulated": diagnosis.replayed_before, "corrected": diagnosis.replayed_after}
+    for signal, replayed in replays.items():
+        for each in replayed:
+            tracks.append(Track(f"/{names[each.run.name]}/validate/{signal}", each.run.time, each.position))
+    return tracks

@@ -17,7 +17,7 @@ from armlab.proof.open.real_identification.looks import LOOKS_FILE, Looks
 from armlab.recordings.public import open_public_recording
 
 
-def bench_real_arms(
+def prove_on_public_arms(
     results: Path,
     recordings: Path,
     only: Sequence[str] = (),

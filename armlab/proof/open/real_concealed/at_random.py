@@ -17,7 +17,8 @@ from pydantic import TypeAdapter
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.common.settings import read_json, suggest_name
-from armlab.proof.open.real_concealed.claims import DrawnVerdict, judge_drawn
+from armlab.effects.library import EFFECT_IDS, effect_named
+from armlab.proof.open.real_concealed.claims import DrawnVerdict, LabelledFinding, judge_drawn, label_weighed
 from armlab.proof.open.real_concealed.conceal import ReferenceModel, SoughtEffect, identify_reference
 from armlab.proof.open.real_concealed.concealed_case import Case
 from armlab.proof.open.real_concealed.draw import DrawnCase, draw_cases
@@ -28,13 +29,13 @@ from armlab.proof.open.real_concealed.examine import (
     diagnose_concealed,
     sought_in_case,
 )
-from armlab.proof.open.real_concealed.finding_words import finding_in_words, list_findings
-from armlab.proof.open.real_concealed.labels import LabelledFinding, label_weighed
 from armlab.proof.open.real_concealed.observation import read_observation, write_observation
 from armlab.proof.open.real_identification.identify_recording import recipe_named
 from armlab.proof.open.real_identification.looks import LOOKS_FILE, Looks
 from armlab.proof.open.stored import code_digest
 from armlab.recordings.public import open_public_recording
+from armlab.recordings.reading.words import NAMES as MISTAKE_NAMES
+from armlab.report.words import effect_in_words
 
 REAL_ARMS = ("emps", "staubli-tx40", "unisa-ur10", "unisa-panda", "kuka-kr300")
 OUTCOMES_FOLDER = ".concealed"  # below that of the recordings
@@ -270,3 +271,19 @@ def _claim_in_words(finding: ReportedFinding) -> str:
         words += f" ({finding.probability:.2f})"
     others = [each.effect.replace("_", " ") for each in finding.members if each.effect != finding.effect]
     return f"{words} or {', '.join(others)}" if others else words
+
+
+def finding_in_words(finding: ReportedFinding) -> str:
+    """A finding with its place, by number as the plan of the concealed effects."""
+    place = "the whole robot"
+    is_mistake = finding.effect in MISTAKE_NAMES and finding.effect not in EFFECT_IDS
+    if finding.joints:
+        kind = "link" if not is_mistake and effect_named(finding.effect).where == "link" else "joint"
+        place = f"{kind} {' from joint '.join(map(str, finding.joints[:2]))}"
+    words = MISTAKE_NAMES[finding.effect] if is_mistake else effect_in_words(finding.effect)
+    return f"{words}, {place}"
+
+
+def list_findings(findings: Sequence[ReportedFinding]) -> str:
+    """Findings in a cell."""
+    return "; ".join(finding_in_words(each) for each in findings) or "–"

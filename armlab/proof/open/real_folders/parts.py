@@ -6,7 +6,7 @@ from pathlib import Path
 
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
-from armlab.proof.open.real_arms.all_arms import bench_real_arms
+from armlab.proof.open.real_arms.all_arms import prove_on_public_arms
 from armlab.proof.open.real_folders.all_folders import FolderProof, prove_folders
 from armlab.proof.open.real_identification.identify_recording import RECIPES
 from armlab.recordings.public import LOCAL_COPIES_VARIABLE
@@ -14,7 +14,7 @@ from armlab.recordings.public import LOCAL_COPIES_VARIABLE
 
 @dataclass(frozen=True)
 class PublicProof:
-    """Where the public recordings and their results are; fields as in `bench_real_arms`."""
+    """Where the public recordings and their results are; fields as in `prove_on_public_arms`."""
 
     results: Path
     recordings: Path
@@ -44,7 +44,7 @@ def prove_on_real_arms(
         yield from prove_folders(folders, [name for name in only if name in own])
     if public is not None and (not only or set(only) & set(arms)):
         chosen = [name for name in only if name in arms]
-        yield from bench_real_arms(public.results, public.recordings, chosen, public.peers, progress)
+        yield from prove_on_public_arms(public.results, public.recordings, chosen, public.peers, progress)
 
 
 def _folder_names(folders: FolderProof, optional: bool) -> tuple[str, ...]:
