@@ -29,17 +29,22 @@ def tuning(out: Path | None) -> ResultLines:
     """List the tuning numbers of the diagnosis.
 
     Each with its value, unit, meaning and source, as Markdown. Their names are those of `diagnose --set` and
-    `proof ablate --vary`.
+    `proof ablate --vary`. Then how many there are, and how many constants beside them.
     """
     from armlab.common.files import write_texts
     from armlab.diagnosis.tuning import Tuning, tuning_numbers, tuning_page
+    from armlab.diagnosis.tuning_counts import count_tuning
 
     if out is None:
         yield tuning_page().rstrip("\n")
     else:
         write_texts({out.name: tuning_page()}, out.parent)
         yield f"wrote {out}"
-    return {"tuning": list(tuning_numbers(Tuning())), "files": [] if out is None else [out]}
+    counts = count_tuning()
+    yield f"tuning numbers {counts.numbers}, of which {counts.by_eye} are chosen by eye"
+    yield f"read where names are tested and weighed {counts.deciding}"
+    yield f"named constants of modules of the diagnosis and the reading {counts.constants}"
+    return {"tuning": list(tuning_numbers(Tuning())), "counts": counts, "files": [] if out is None else [out]}
 
 
 @click.command()

@@ -193,7 +193,6 @@ class SearchTuning:
         12, unit="effects", meaning="effects beside usual friction: a start that asks for more has lost its way"
     )
     min_score_step: float = tuned(1e-6, unit="log likelihood", meaning="smaller gains of a move are rounding")
-    max_moves: int = tuned(200, unit="moves", meaning="moves from one start at most")
 
 
 @dataclass(frozen=True)
@@ -274,7 +273,6 @@ class PredictionTuning:
         meaning="cut-offs of the positions that are tried for predictions",
         least=0.01,
     )
-    max_changes: int = tuned(60, unit="changes", meaning="most parts that are added or left out", least=0)
     max_follow_rounds: int = tuned(
         8, unit="fits", meaning="fits with columns that follow the model, before it counts as one that does not settle"
     )
@@ -479,16 +477,13 @@ class LocationTuning:
         unit="standard errors times sqrt(log(stretches + 1))",
         meaning="excess error of a joint that is more than chance",
     )
-    min_bin_share: float = tuned(
-        0.5, unit="of the worst bin's excess", meaning="bins with more of it are the regime", most=0.99
-    )
-    min_run_share: float = tuned(
-        0.5, unit="of the worst run's excess", meaning="runs with more of it are affected", most=0.99
+    min_share: float = tuned(
+        0.5,
+        unit="of the worst bin's or run's excess, or of all excess",
+        meaning="bins with more of it are the regime, runs are affected, a stretch is named by its time",
+        most=0.99,
     )
     peak_parts: int = tuned(10, meaning="a peak is no longer than one of so many equal parts of a run", least=1)
-    min_peak_share: float = tuned(
-        0.5, unit="of all excess", meaning="a stretch with more of it is named by its time", most=1.0
-    )
 
 
 @dataclass(frozen=True)
@@ -534,7 +529,6 @@ class ClaimTuning:
     max_deficit: float = tuned(
         2.0, unit="log likelihood", meaning="a rival whose score is lower by less may be as good by chance"
     )
-    max_rivals: int = tuned(3, unit="rivals", meaning="rivals of a claim that are listed")
     outlying_factor: float = tuned(
         4.0, unit="of the other links' median width", meaning="a link that is so much wider carries something"
     )
@@ -594,9 +588,6 @@ class NamingTuning:
         8.0, unit="log evidence", meaning="what an effect adds that is weighed beside names that passed all tests"
     )
     max_additions: int = tuned(4, unit="effects", meaning="that are weighed beside names that passed all tests")
-    max_asked: int = tuned(
-        40, unit="laws", meaning="that are fitted to find one that breaks no law of physics", least=1
-    )
 
 
 @dataclass(frozen=True)
@@ -713,24 +704,15 @@ class ComparisonTuning:
         most=1.0,
     )
     least_evidence: float = tuned(
-        5.0, unit="log likelihood", meaning="least log evidence of a change", source="a Bayes factor of 150"
+        5.0,
+        unit="log likelihood",
+        meaning="of a change, and of what the model has against a fault that it does not have; less is a rival",
+        source="a Bayes factor of 150",
     )
     least_gain: float = tuned(
         0.003,
         unit="of the held-out error",
         meaning="gain that a change makes on stretches of the recordings that are held out in turn",
-    )
-    familiar_odds: float = tuned(
-        5.0,
-        unit="log odds",
-        meaning="of a change of what the model has, against a fault that it does not have",
-        source="as least_evidence",
-    )
-    max_rival_deficit: float = tuned(
-        5.0,
-        unit="log likelihood",
-        meaning="a change that explains the difference so little worse is a rival",
-        source="as least_evidence",
     )
     max_rivals: int = tuned(2, unit="rivals", meaning="most rivals of a change", source="a class has three names")
     max_asked: int = tuned(12, unit="candidates", meaning="candidates that are tested at each step", least=1)

@@ -83,7 +83,7 @@ def _with_single_laws(table: ChangeTable, chosen: tuple[int, ...], banned: froze
 def find_rivals(table: ChangeTable, chosen: Sequence[int], tested: Tested) -> tuple[tuple[int, float], ...]:
     """Groups that explain the difference nearly as well in the place of a chosen one, with their deficits."""
     deficits = table.deficits(chosen, tested)
-    near = [int(each) for each in np.argsort(deficits) if deficits[each] < table.tuning.max_rival_deficit]
+    near = [int(each) for each in np.argsort(deficits) if deficits[each] < table.tuning.least_evidence]
     others = [(each, float(max(deficits[each], 0.0))) for each in near if each != tested.group]
     return tuple(others[: table.tuning.max_rivals])
 

@@ -123,7 +123,7 @@ class ChangeTable:
     @cached_property
     def prior_odds(self) -> Array:
         """Log odds before any data, (groups,): what the model has changes sooner than a new fault appears."""
-        return np.array([self.tuning.familiar_odds if each.familiar else 0.0 for each in self.groups])
+        return np.array([self.tuning.least_evidence if each.familiar else 0.0 for each in self.groups])
 
     def odds(self, evidence: Array) -> Array:
         """Log evidence where the scale of the errors is itself known by a few stretches alone (Student's t)."""

@@ -308,7 +308,7 @@ def _integrates(fit: ServoFit, tuning: MotionTuning) -> bool:
     """
     gain, error = float(fit.values[place("ki")]), float(fit.standard_errors()[place("ki")])
     slowest, fastest = tuning.rate_bounds
-    return bool(tuning.told * error < gain and slowest <= gain / fit.values[place("kp")] <= fastest)
+    return bool(tuning.class_factor * error < gain and slowest <= gain / fit.values[place("kp")] <= fastest)
 
 
 def _with_one_difference(windows: Windows, nominal: Array, tuning: MotionTuning) -> ServoFit | None:

@@ -279,8 +279,8 @@ def _compare_joint(
     joint, looks = place_of
     first, last = (to_coordinates(start) for start in starts)
     numbers = np.flatnonzero(free).tolist()
-    every = _fit_pair(pair, (first, last - first), free, numbers, tuning.pair_evaluations)
-    model = _Model(every, free, tuple(numbers), tuning.pair_evaluations)
+    every = _fit_pair(pair, (first, last - first), free, numbers, tuning.refit_evaluations)
+    model = _Model(every, free, tuple(numbers), tuning.refit_evaluations)
     judged = apart = _other_half_errors(pair, model)
     gains: dict[int, tuple[float, float, float]] = {}
     samples = len(pair[0].position) + len(pair[1].position)
@@ -303,7 +303,7 @@ def _compare_joint(
             break
         best = min(needless, key=lambda number: float(errors[number].sum()))
         model, judged = tied[best], errors[best]
-    models = (model, _Model(every, free, tuple(numbers), tuning.pair_evaluations))
+    models = (model, _Model(every, free, tuple(numbers), tuning.refit_evaluations))
     judged_models = [(each, *_run_errors(pair, each)) for each in models]
     found, test = {number: gains[number] for number in model.changing}, (looks, tuning.max_p_value)
     changes = [_change(pair, number, joint, judged_models[number not in found], found, test) for number in numbers]

@@ -59,7 +59,7 @@ def compare_load(old: MotionRecording, new: MotionRecording) -> Comparison | Non
     diagnoses = [Diagnosis(each, simulation, "inconclusive", "") for each in recordings]
     notes = () if _kp(old) else ("kp is not stated: the load of the robot file in the old recording sets the scale.",)
     found = conclude(seen, diagnoses, notes, ())
-    if log_odds > settings.tuning.comparison.max_rival_deficit:
+    if log_odds > settings.tuning.comparison.least_evidence:
         return found
     if not any(each.effect == PAYLOAD_FACTS.id for each in found.named):
         return None

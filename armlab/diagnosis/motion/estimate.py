@@ -322,7 +322,7 @@ def find_start(
         errors = joint_errors(few, starts)
     best = _best_starts(starts, np.mean(errors**2, axis=1), tuning.starts)
     fits = [
-        fit_servo(begin_integrals(few, starts[each]), starts[each], free, tuning.start_evaluations) for each in best
+        fit_servo(begin_integrals(few, starts[each]), starts[each], free, tuning.refit_evaluations) for each in best
     ]
     first = min(fits, key=lambda fit: fit.rms)
     return fit_servo(windows.with_integral(first.integral), first.values, free, tuning.max_evaluations)

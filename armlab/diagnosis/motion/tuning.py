@@ -51,7 +51,10 @@ class MotionTuning:
         least=0.1,
     )
     coupling_replays: int = tuned(
-        3, unit="replays", meaning="of all joints together, each along the path of the one before", least=1
+        3,
+        unit="replays",
+        meaning="of the arm, each along the path or with the shared number of the one before",
+        least=1,
     )
     coupling_rounds: int = tuned(
         2, unit="rounds", meaning="in which the usual numbers and the loads take turns before the choice", least=1
@@ -81,9 +84,10 @@ class MotionTuning:
     )
     max_start_windows: int = tuned(24, unit="windows", meaning="most windows of the fits that compare starts", least=2)
     starts: int = tuned(2, unit="starts", meaning="starts that are fitted on few windows", least=1)
-    start_evaluations: int = tuned(8, unit="evaluations", meaning="of each of these fits", least=1)
     max_evaluations: int = tuned(15, unit="evaluations", meaning="of a fit from a start", least=1)
-    refit_evaluations: int = tuned(8, unit="evaluations", meaning="of a fit that starts near its end", least=1)
+    refit_evaluations: int = tuned(
+        8, unit="evaluations", meaning="of a fit that starts near its end, and of one that compares starts", least=1
+    )
     max_judged_windows: int = tuned(
         60, unit="windows", meaning="most windows of the choice; the numbers come from all", least=4
     )
@@ -117,14 +121,8 @@ class MotionTuning:
     rate_bounds: tuple[float, ...] = tuned(
         (0.1, 50.0), unit="1/s", meaning="of an integral gain over kp: slower is an offset, faster is friction"
     )
-    told: float = tuned(
-        3.0, unit="times a standard error", meaning="that an integral gain is above zero, to be one", least=0.0
-    )
     wound_up_levels: tuple[float, ...] = tuned(
         (0.2, 0.6), unit="of the torque that the motion needs", meaning="starts of the limit of an integral"
-    )
-    shared_replays: int = tuned(
-        3, unit="replays", meaning="most replays of the arm for one number that all joints share", least=1
     )
     min_gain: float = tuned(
         0.02,
@@ -208,7 +206,7 @@ class MotionTuning:
     class_factor: float = tuned(
         3.0,
         unit="times a standard error",
-        meaning="growth with one more free number that makes the two a class",
+        meaning="growth with one more free number that makes the two a class; size of an integral gain that is there",
         least=1.0,
     )
     class_correlation: float = tuned(
@@ -220,7 +218,6 @@ class MotionTuning:
         meaning="gravity below it does not set the scale of torques",
         most=1.0,
     )
-    pair_evaluations: int = tuned(8, unit="evaluations", meaning="of a fit of two recordings", least=1)
 
 
 DEFAULT = MotionTuning()

@@ -88,7 +88,7 @@ def _best_regime(power: Array, values: Array, tuning: LocationTuning) -> tuple[f
     counts = np.bincount(bins, minlength=count)
     means = np.bincount(bins, power, count) / np.maximum(counts, 1)
     ordered = float(np.average((means - power.mean()) ** 2, weights=counts)) / max(float(np.var(power)), 1e-300)
-    high = np.flatnonzero(means > tuning.min_bin_share * means.max())
+    high = np.flatnonzero(means > tuning.min_share * means.max())
     if len(high) >= count - 1:
         return ordered, "over its whole range"
     spans = np.split(high, np.flatnonzero(np.diff(high) > 1) + 1)
@@ -103,7 +103,7 @@ def _affected_runs(power: Array, observed: Observed, tuning: LocationTuning) -> 
         parts = [power[each.start : each.stop] for each in observed.segments if each.run == index]
         means[name] = float(np.mean(np.concatenate(parts)))
     worst = max(means.values())
-    return tuple(name for name, mean in means.items() if mean > tuning.min_run_share * worst)
+    return tuple(name for name, mean in means.items() if mean > tuning.min_share * worst)
 
 
 def _peak_stretch(power: Array, observed: Observed, tuning: LocationTuning) -> tuple[float, float] | None:
@@ -113,7 +113,7 @@ def _peak_stretch(power: Array, observed: Observed, tuning: LocationTuning) -> t
         part = np.maximum(power[each.start : each.stop], 0)
         width = max(len(part) // tuning.peak_parts, 1)
         sums = np.convolve(part, np.ones(width), mode="valid")
-        if total > 0 and sums.max() > tuning.min_peak_share * total:
+        if total > 0 and sums.max() > tuning.min_share * total:
             start = observed.time[each.start + int(np.argmax(sums))]
             return float(start), float(start + width / observed.rate_hz)
     return None

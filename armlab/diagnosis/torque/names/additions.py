@@ -85,16 +85,16 @@ def _acting_where(model: FittedModel, found: Found) -> frozenset[int]:
 
 def _likeliest(model: FittedModel, banned: frozenset[int]) -> Found | None:
     """The unusual effect that raises the score most and breaks no law of physics."""
-    solver, tuning = model.solver, model.design.settings.tuning.naming
+    solver, tuning = model.solver, model.design.settings.tuning
     search = Search(solver, model.design.settings, True, 0)
     gains, asked = search.gains(model.state), 0
     for group in map(int, np.argsort(-gains)):
-        if gains[group] < tuning.least_addition or asked >= tuning.max_asked:
+        if gains[group] < tuning.naming.least_addition or asked >= tuning.search.max_candidates_asked:
             return None
         if group in banned or not _may_be_added(model, search, group):
             continue
         asked += 1
-        found = _added(model, search, group, tuning.least_addition)
+        found = _added(model, search, group, tuning.naming.least_addition)
         if found is not None:
             return found
     return None

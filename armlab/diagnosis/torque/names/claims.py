@@ -45,7 +45,7 @@ def make_claims(
     ]
     claims += _link_claims(model, wide, links, names.links)
     known = list(dict.fromkeys(group.candidate.facts for group in model.solver.groups))
-    most = model.design.settings.tuning.claims.max_rivals
+    most = model.design.settings.tuning.naming.max_class - 1
     claims = [_with_equal_sums(claim, claims, known, most) for claim in claims]
     return tuple(sorted(claims, key=lambda claim: -claim.evidence.score))
 

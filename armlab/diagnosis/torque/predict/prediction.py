@@ -319,15 +319,14 @@ class _Trial:
         state, scores = self.begin, self._scores(self.begin)
         search = Search(self.model.solver, self.model.design.settings, True, 0)
         absurd = {group for group in state.groups if search.objection(state, group) is not None}
-        for _ in range(tuning.max_changes):
+        while True:
             changes = [(scores - self._scores(other), other) for other in self._changes(search, state)]
             worth = [each for each in changes if _is_sure(each[0], tuning)]
             worth.sort(key=lambda each: -float(np.mean(each[0])))
             better = next((each for each in worth if self._is_physical(search, each[1], absurd)), None)
             if better is None:
-                break
+                return state
             scores, state = scores - better[0], better[1]
-        return state
 
     def _is_physical(self, search: Search, state: State, absurd: Container[int]) -> bool:
         """Whether no group breaks a law of physics; absurd: those that did so before."""

@@ -103,10 +103,8 @@ class Search:
 
     def climb(self, state: State, steps: list[Step]) -> State:
         """The state where no move raises the score any more."""
-        for _ in range(self.tuning.max_moves):
-            before, better = self.solver.fit(state).score, self._step(state)
-            if better is None:
-                break
+        while (better := self._step(state)) is not None:
+            before = self.solver.fit(state).score
             what, state = better
             steps.append(Step(what, self.solver.fit(state).score, before=before))
         return state
