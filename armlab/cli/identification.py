@@ -9,7 +9,18 @@ from armlab.cli.options import FiniteNumber, OutputPath
 from armlab.cli.output import prints_result, tell_progress
 from armlab.common.documents import ResultLines
 
-METHODS = ("weighted", "ordinary", "alike", "huber", "tukey", "total", "likelihood", "instrumental", "physical")
+METHODS = (
+    "weighted",
+    "excited",
+    "ordinary",
+    "alike",
+    "huber",
+    "tukey",
+    "total",
+    "likelihood",
+    "instrumental",
+    "physical",
+)
 
 
 @click.command()
@@ -18,10 +29,8 @@ METHODS = ("weighted", "ordinary", "alike", "huber", "tukey", "total", "likeliho
 @click.option(
     "--method",
     type=click.Choice(METHODS),
-    default="weighted",
-    show_default=True,
     metavar="NAME",
-    help=f"Estimator: {', '.join(METHODS)}.",
+    help=f"Estimator: {', '.join(METHODS)} [default: the one that predicts best].",
 )
 @click.option(
     "--cutoff-hz", type=FiniteNumber(min=0, min_open=True), help="Cut-off of the low-pass [default: from the data]."
@@ -37,7 +46,7 @@ METHODS = ("weighted", "ordinary", "alike", "huber", "tukey", "total", "likeliho
 def identify(
     recording: Path,
     out: Path | None,
-    method: str,
+    method: str | None,
     cutoff_hz: float | None,
     tolerance: float | None,
     choose: bool,

@@ -43,18 +43,13 @@ def folds(data: Regression, blocks: int = FOLD_BLOCKS) -> Iterator[Fold]:
         start += length
 
 
-def held_out_error(fit: Regression, judge: Regression, estimator: Estimator, blocks: int = FOLD_BLOCKS) -> float:
-    """||tau - tau_hat|| / ||tau|| over all held-out blocks.
-
-    fit, judge: the same samples; `judge` may hold the torque as recorded where `fit` holds it filtered.
-    """
-    error, size = 0.0, 0.0
-    for fold in folds(fit, blocks):
-        values = estimator(fit.rows(fold.fit)).values
-        held = judge.rows(fold.judge)
-        error += float(np.sum(held.residuals(values) ** 2))
-        size += float(np.sum(held.torque**2))
-    return float(np.sqrt(error / size))
+def held_out_score(data: Regression, estimator: Estimator) -> float:
+    """Mean logarithm of the joints' rms errors over all held-out blocks: a small joint counts as a large one."""
+    squares = np.zeros(data.joints)
+    for fold in folds(data):
+        values = estimator(data.rows(fold.fit)).values
+        squares += np.sum(data.rows(fold.judge).residuals(values) ** 2, axis=0)
+    return float(np.mean(0.5 * np.log(np.maximum(squares / data.samples, 1e-300))))
 
 
 GRAM_RIDGE = 1e-9  # of a column's power: above the rounding of the products, below any information

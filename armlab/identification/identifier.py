@@ -10,7 +10,7 @@ from armlab.effects.contract import Candidate
 from armlab.effects.scene import scene_of
 from armlab.identification.components import usual_components
 from armlab.identification.covariance import uncertainty
-from armlab.identification.cross_validation import held_out_error
+from armlab.identification.cross_validation import held_out_score
 from armlab.identification.estimators.least_squares import (
     EXCITED_TOLERANCE,
     RANK_TOLERANCE,
@@ -46,6 +46,7 @@ from armlab.recordings.differentiate import Signals
 from armlab.recordings.recording import Run
 from problem.arm import Arm
 
+USUAL_METHOD = "weighted"
 LOAD_TOLERANCE = 1e-8  # of the links, between two of these rounds
 MAX_LOAD_ROUNDS = 12  # of load-dependent friction that follows the fitted links themselves
 PreparedData = tuple[Structure, Sequence[Signals], Regression]
@@ -99,7 +100,7 @@ class Identifier:
 
     arm: Arm
     components: tuple[Candidate, ...] | None = None
-    method: str = "weighted"
+    method: str = USUAL_METHOD
     pull: Pull = NO_PULL
     cutoff_hz: float | None = None
     robot: str | None = None
@@ -136,10 +137,16 @@ class Identifier:
         structure = with_load(self._structure(), signals)
         return structure, signals, regression(structure, signals)
 
-    def held_out_error(self, runs: Sequence[Run]) -> float:
-        """||tau - tau_hat|| / ||tau|| of the filtered torque on held-out blocks of these runs."""
-        fitted = self.prepare(runs)
-        return held_out_error(fitted[2], fitted[2], METHODS[self.method](fitted, self.pull))
+    def held_out_score(self, fitted: PreparedData) -> float:
+        """Mean logarithm of the joints' rms errors, N m (N), on blocks of the runs that are held out in turn."""
+        return held_out_score(fitted[2], METHODS[self.method](fitted, self.pull))
+
+    @property
+    def manner(self) -> str:
+        """Method and prior, as a reader is told."""
+        told = {"weighted": "least squares", "excited": "least squares in the directions that the motion excites"}
+        prior = "" if self.pull == NO_PULL else ", drawn to the links of the robot file"
+        return f"{told.get(self.method, self.method)}{prior}"
 
     def _structure(self) -> Structure:
         components = usual_components(self.arm) if self.components is None else self.components

@@ -1,7 +1,7 @@
 """The flows of `armlab identify` and `armlab predict`: from a recording folder to lines, a model file and a page."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
@@ -14,7 +14,8 @@ from armlab.common.files import write_texts
 from armlab.common.report.page import Table, png_address, render_page
 from armlab.common.report.palette import figure_style
 from armlab.common.report.wording import format_number, format_unit
-from armlab.identification.identifier import Identifier
+from armlab.identification.identifier import USUAL_METHOD, Identifier
+from armlab.identification.identifier_choice import choose_identifier
 from armlab.identification.model import Model
 from armlab.identification.model_file import model_content, model_text
 from armlab.identification.priors import NO_PULL, Pull
@@ -144,12 +145,13 @@ NO_VALIDATION_WARNING = (
 
 @dataclass(frozen=True)
 class IdentifyOptions:
-    """method: one of METHODS. tolerance: of a prior about the robot's own links. choose: by cross-validation.
+    """method: one of METHODS, chosen if left out. tolerance: of a prior about the robot's own links. choose: by
+    cross-validation.
 
     as_read: the recording and the robot file are not doubted.
     """
 
-    method: str = "weighted"
+    method: str | None = None
     cutoff_hz: float | None = None
     tolerance: float | None = None
     choose: bool = False
@@ -232,24 +234,18 @@ def _build_identifier(recording: Recording, options: IdentifyOptions) -> tuple[I
         if cutoff is None:
             cutoff = choose_cutoff_hz(arm, recording.runs_to_identify())
             how = [f"cut-off: {cutoff:.4g} Hz, which predicts best on blocks of the runs that identify"]
-        usual = Identifier(arm, None, options.method, pull, cutoff, robot)
-        if options.method == "weighted" and pull == NO_PULL:
-            return best_inside([usual, replace(usual, method="excited")], recording.runs_to_identify()), how
-        return usual, how
+        if options.method is not None or options.tolerance:
+            return Identifier(arm, None, options.method or USUAL_METHOD, pull, cutoff, robot), how
+        chosen = choose_identifier(arm, recording.runs_to_identify(), cutoff, robot)
+        return chosen, [*how, f"estimator: {chosen.manner}, which predicts best on these blocks"]
     groups = candidate_groups(arm)
     candidates = (pull,) if options.tolerance else candidate_pulls(arm)
     choice = select_structure(arm, recording.with_role("identify"), groups, candidates).choice
     line = f"chosen: {describe_choice(choice)}; held-out error {100 * choice.held_out:.2f} % of the torque"
-    method = "alike" if options.method == "weighted" and not choice.by_joint else options.method
+    method = options.method or (USUAL_METHOD if choice.by_joint else "alike")
     components = components_of(groups, choice.groups)
     filters = choice.cutoff_hz, robot, choice.position_factor
     return Identifier(arm, components, method, choice.pull, *filters), [line]
-
-
-def best_inside(identifiers: Sequence[Identifier], runs: Sequence[Run]) -> Identifier:
-    """The one that predicts best on blocks of the runs that identify, left out in turn; the first of equals."""
-    errors = [each.held_out_error(runs) for each in identifiers]
-    return identifiers[int(np.argmin(errors))]
 
 
 def robot_path(recording: Recording) -> str:

@@ -17,11 +17,15 @@ from armlab.common.errors import InputError
 from armlab.common.report.wording import format_number
 from armlab.effects.parameters import ParameterValue
 from armlab.identification.estimators.least_squares import EXCITED_TOLERANCE, WeightedLeastSquares
+from armlab.identification.identifier import Identifier
+from armlab.identification.identifier_choice import choose_identifier
 from armlab.identification.identify import overfit_warnings
 from armlab.identification.model import Model
+from armlab.identification.priors import NO_PULL
 from armlab.identification.regression import Regression
 from armlab.identification.torque_model import is_told
 from armlab.identification.validation import JointError, RunError, filter_in_words
+from armlab.recordings.recording import Run
 from armlab.recordings.recording_file import Draft, DraftRun, write_recording
 
 COLUMNS = {"time": "t", "position": ("q1", "q2", "q3"), "torque": ("tau1", "tau2", "tau3")}
@@ -150,3 +154,30 @@ def test_directions_that_the_motion_hardly_excites_stay_zero_and_keep_the_interv
     assert np.abs(free.values).max() > 10
     np.testing.assert_allclose(excited.values, [1.5, 1.5], atol=0.05)
     np.testing.assert_allclose(excited.bread, free.bread, rtol=0.3)
+
+
+def test_short_motion_is_drawn_to_the_links_of_the_robot_file_and_predicts_other_motion_better() -> None:
+    model = structure()
+    short = run(model, truth(model), 0, noise=3.0, seconds=1.5)
+    chosen = choose_identifier(arm(), [short], 10.0, "irb120-arm")
+    assert "drawn to the links of the robot file" in chosen.manner
+    other = run(model, truth(model), 1, seconds=10.0)
+    errors = [total(each.fit([short]).model_, other) for each in (chosen, Identifier(arm(), cutoff_hz=10.0))]
+    assert errors[0] < 0.5 * errors[1]
+
+
+def test_long_motion_is_fitted_by_least_squares_alone() -> None:
+    model = structure()
+    long = run(model, truth(model), 0, noise=0.05, seconds=20.0)
+    assert choose_identifier(arm(), [long], 10.0, "irb120-arm").manner == "least squares"
+
+
+def test_an_arm_without_links_has_no_prior() -> None:
+    bare = replace(arm(), links=None)
+    model = structure()
+    short = run(model, truth(model), 0, noise=3.0, seconds=1.5)
+    assert choose_identifier(bare, [short], 10.0, "bare").pull == NO_PULL
+
+
+def total(model: Model, other: Run) -> float:
+    return float(np.sqrt(np.mean((model.predict(other) - other.torque) ** 2)))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.identification.identifier import Identifier
+from armlab.identification.identifier_choice import choose_identifier
 from armlab.identification.model_file import read_model
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.cutoff_trial import choose_cutoff_hz
@@ -92,7 +92,8 @@ def measure_errors(folder: Path, verdict_folder: Path, cutoff_hz: float | None) 
 def _left_by_identification(recording: Recording, plain: PlainFit) -> Array:
     """Residual of the usual identification, (rows, joints), as a share of each joint's torque."""
     runs = [run for run in split_runs(recording.runs) if run.role == "identify"]
-    model = Identifier(recording.arm, cutoff_hz=choose_cutoff_hz(recording.arm, runs)).fit(runs).model_
+    chosen = choose_identifier(recording.arm, runs, choose_cutoff_hz(recording.arm, runs), recording.arm.name)
+    model = chosen.fit(runs).model_
     return _share_left(model, [each.rows for each in plain.held_out])
 
 
