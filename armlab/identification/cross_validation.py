@@ -43,13 +43,13 @@ def folds(data: Regression, blocks: int = FOLD_BLOCKS) -> Iterator[Fold]:
         start += length
 
 
-def held_out_score(data: Regression, estimator: Estimator) -> float:
-    """Mean logarithm of the joints' rms errors over all held-out blocks: a small joint counts as a large one."""
+def held_out_errors(data: Regression, estimator: Estimator) -> Array:
+    """Rms error of each joint over all held-out blocks, (joints,), N m (N)."""
     squares = np.zeros(data.joints)
     for fold in folds(data):
         values = estimator(data.rows(fold.fit)).values
         squares += np.sum(data.rows(fold.judge).residuals(values) ** 2, axis=0)
-    return float(np.mean(0.5 * np.log(np.maximum(squares / data.samples, 1e-300))))
+    return np.asarray(np.sqrt(squares / data.samples))
 
 
 GRAM_RIDGE = 1e-9  # of a column's power: above the rounding of the products, below any information

@@ -10,7 +10,7 @@ from armlab.effects.contract import Candidate
 from armlab.effects.scene import scene_of
 from armlab.identification.components import usual_components
 from armlab.identification.covariance import uncertainty
-from armlab.identification.cross_validation import held_out_score
+from armlab.identification.cross_validation import held_out_errors
 from armlab.identification.estimators.least_squares import (
     EXCITED_TOLERANCE,
     RANK_TOLERANCE,
@@ -137,9 +137,9 @@ class Identifier:
         structure = with_load(self._structure(), signals)
         return structure, signals, regression(structure, signals)
 
-    def held_out_score(self, fitted: PreparedData) -> float:
-        """Mean logarithm of the joints' rms errors, N m (N), on blocks of the runs that are held out in turn."""
-        return held_out_score(fitted[2], METHODS[self.method](fitted, self.pull))
+    def held_out_errors(self, fitted: PreparedData) -> Array:
+        """Rms error of each joint, (joints,), N m (N), on blocks of the runs that are held out in turn."""
+        return held_out_errors(fitted[2], METHODS[self.method](fitted, self.pull))
 
     @property
     def manner(self) -> str:

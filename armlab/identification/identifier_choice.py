@@ -8,12 +8,14 @@ prior holds these where an arm can be, and what the data tell stays as it is.
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from armlab.identification.identifier import Identifier
 from armlab.identification.priors import Pull
 from armlab.recordings.recording import Run
 from problem.arm import Arm
 
-WIDE_TOLERANCE = 3.0  # of a prior about the robot file's links, as `reading.free_width`: links that are free
+WIDE_TOLERANCE = 10.0  # of a prior about the robot file's links: bodies may be so many times as large
 MIN_GAIN = 0.01  # of the mean logarithm of the joints' errors: what another estimator than the first has to lower it by
 
 
@@ -31,6 +33,10 @@ def choose_identifier(arm: Arm, runs: Sequence[Run], cutoff_hz: float, robot: st
 
 
 def _scored(identifiers: Sequence[Identifier], runs: Sequence[Run]) -> list[tuple[float, Identifier]]:
-    """Identifiers of the same columns, each with its score on held-out blocks."""
+    """Identifiers of the same columns, each with the mean logarithm of the joints' errors on held-out blocks.
+
+    A small joint counts as a large one.
+    """
     fitted = identifiers[0].prepare(runs)
-    return [(each.held_out_score(fitted), each) for each in identifiers]
+    errors = ((each.held_out_errors(fitted), each) for each in identifiers)
+    return [(float(np.mean(np.log(np.maximum(own, 1e-300)))), each) for own, each in errors]

@@ -6,6 +6,8 @@ A recipe is what is given to this procedure for each recording before it looks a
 import time
 from dataclasses import dataclass
 
+import numpy as np
+
 from armlab.effects.contract import Candidate
 from armlab.identification.identifier import Identifier
 from armlab.identification.priors import Pull
@@ -126,13 +128,10 @@ def _choose_method(recipe: Recipe, recording: Recording, choice: Choice, compone
     free = "weighted" if choice.by_joint else "alike"
     runs = recording.with_role("identify")
     ways = ("physical",) if recipe.physical else ("physical", free)
-    errors = {
-        way: Identifier(
-            recording.arm, components, way, choice.pull, choice.cutoff_hz, None, choice.position_factor
-        ).held_out_error(runs)
-        for way in ways
-    }
-    return min(errors, key=errors.__getitem__)
+    filters = choice.cutoff_hz, None, choice.position_factor
+    tried = [Identifier(recording.arm, components, way, choice.pull, *filters) for way in ways]
+    fitted = tried[0].prepare(runs)
+    return min(tried, key=lambda each: float(np.linalg.norm(each.held_out_errors(fitted)))).method
 
 
 def describe_study(study: Study) -> str:
