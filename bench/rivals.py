@@ -9,9 +9,8 @@ import pandas as pd
 from armlab.common.markdown import markdown_page, markdown_table
 from bench.statistics import is_feasible, quantile
 from bench.statistics.pairwise import duels
-from bench.tables import GROUP_COLUMNS
+from bench.tables import CELL_COLUMNS
 
-_CELL_COLUMNS = [name for name in GROUP_COLUMNS if name != "algorithm"]
 _READING = """\
 Median: of the ends, for an arm the condition number; an infeasible end counts as infinite. Ours better: chance
 that an end of ours is better than one of theirs (A12), ties counting half. p: Wilcoxon's signed-rank test, paired by
@@ -23,9 +22,7 @@ answer: the figure is what a comparison here takes, not the peer's own overhead.
 
 def rivals_table(frame: pd.DataFrame, pairs: Sequence[tuple[str, str]]) -> pd.DataFrame:
     """One row a problem and pair, with the labels of both; frame: as `tidy_frame` returns it."""
-    return pd.DataFrame(
-        [row for _, cell in frame.groupby(_CELL_COLUMNS, sort=False) for row in _pair_rows(cell, pairs)]
-    )
+    return pd.DataFrame([row for _, cell in frame.groupby(CELL_COLUMNS, sort=False) for row in _pair_rows(cell, pairs)])
 
 
 def rivals_page(table: pd.DataFrame) -> str:
@@ -45,7 +42,7 @@ def rivals_page(table: pd.DataFrame) -> str:
 
 def _pair_rows(cell: pd.DataFrame, pairs: Sequence[tuple[str, str]]) -> Iterator[dict[str, Any]]:
     by_label = {str(label): rows for label, rows in cell.groupby("algorithm", sort=False)}
-    place = {name: cell[name].iloc[0] for name in _CELL_COLUMNS}
+    place = {name: cell[name].iloc[0] for name in CELL_COLUMNS}
     for duel in duels(cell, pairs):
         ours, theirs = by_label[duel.subject], by_label[duel.rival]
         yield {

@@ -88,7 +88,7 @@ def run_experiment(path: Path, options: RunOptions, bar: ProgressBar) -> list[Pa
 
 
 def report_run(path: Path, options: RunOptions, bar: ProgressBar) -> ResultLines:
-    """Run a configuration; tells the written files, the table and who beats whom.
+    """Run a configuration; tells the table, who beats whom, and the written files.
 
     The document has the rows of the tables among the files.
     """
@@ -97,12 +97,12 @@ def report_run(path: Path, options: RunOptions, bar: ProgressBar) -> ResultLines
         written = run_experiment(path, options, bar)
     except TrialsFailedError as error:
         failed, written = error, list(error.written)
-    yield from map(str, written)
     from bench.tables import tidy_frame
     from bench.terminal import describe_frame
 
     with open_store(options.store) as store:
         yield from describe_frame(tidy_frame(load_experiment(path).entries, store))
+    yield from map(str, written)
     if failed is not None:
         raise failed
     from pandas import read_csv

@@ -20,7 +20,8 @@ from bench.statistics import Summary, is_feasible, summarise
 from bench.statistics.ends import row_quantiles
 from bench.store import OutcomeFigures, RunStore
 
-GROUP_COLUMNS = ["problem", "swarm_size", "budget", "algorithm"]
+CELL_COLUMNS = ["problem", "swarm_size", "budget"]
+GROUP_COLUMNS = [*CELL_COLUMNS, "algorithm"]
 _ROWS_PER_PIECE = 4096  # that are Python objects at a time; in the table a row takes some tens of bytes
 
 
@@ -84,6 +85,15 @@ def entry_labels(entry: Entry) -> dict[str, object]:
         "algorithm": entry.algorithm,
         "repetition": entry.trial.repetition,
     }
+
+
+def cell_label(frame: pd.DataFrame, cell: tuple[Any, ...]) -> str:
+    """A problem, with its swarm size and budget where the frame has several. cell: by `CELL_COLUMNS`."""
+    problem, swarm_size, budget = cell
+    parts = [str(problem)]
+    parts += [f"{swarm_size} points"] if frame["swarm_size"].nunique() > 1 else []
+    parts += [f"{budget} evaluations"] if frame["budget"].nunique() > 1 else []
+    return ", ".join(parts)
 
 
 SUMMARY_COLUMNS = ["algorithm", *Summary.__dataclass_fields__, "evaluations"]

@@ -8,10 +8,9 @@ from armlab.common.text_table import text_table
 from bench.printed import display_name
 from bench.statistics.critical_difference import ERROR_RATE, CriticalDifference, critical_difference
 from bench.statistics.pairwise import log_losses
-from bench.tables import failed_sentences, summary_table
+from bench.tables import CELL_COLUMNS, cell_label, failed_sentences, summary_table
 
 MAX_ROWS = 40  # of the table: a screen
-_CELLS = ["problem", "swarm_size", "budget"]
 _SHOWN = ("median", "lower_quartile", "upper_quartile", "minimum", "feasible_share")
 
 
@@ -19,10 +18,14 @@ def describe_frame(frame: pd.DataFrame) -> Iterator[str]:
     """The lines about a tidy frame: what failed, a table of medians and quartiles, and a winner for each problem."""
     yield from failed_sentences(frame)
     yield from _table_lines(frame)
-    cells = list(frame.groupby(_CELLS, sort=False))
+    yield from winner_sentences(frame)
+
+
+def winner_sentences(frame: pd.DataFrame) -> Iterator[str]:
+    """Who beats whom on each problem, swarm size and budget, a sentence each; a screen of them."""
+    cells = list(frame.groupby(CELL_COLUMNS, sort=False))
     for cell, rows in cells[:MAX_ROWS]:
-        varying = [str(part) for name, part in zip(_CELLS, cell, strict=True) if frame[name].nunique() > 1]
-        where = f"{', '.join(varying)}: " if varying else ""
+        where = f"{cell_label(frame, cell)}: " if len(cells) > 1 else ""
         yield f"{where}{winner_sentence(critical_difference(log_losses(rows)))}"
     if len(cells) > MAX_ROWS:
         yield f"and {len(cells) - MAX_ROWS} problems more"
@@ -45,7 +48,7 @@ def winner_sentence(found: CriticalDifference) -> str:
 
 def _table_lines(frame: pd.DataFrame) -> list[str]:
     table = summary_table(frame)
-    budgets = frame.drop_duplicates([*_CELLS, "algorithm"])["budget"].to_numpy()
+    budgets = frame.drop_duplicates([*CELL_COLUMNS, "algorithm"])["budget"].to_numpy()
     if len(set(budgets)) > 1:
         table.insert(0, "budget", budgets)
     names = [name for name in ("problem", "swarm_size", "budget", "algorithm") if name in table]

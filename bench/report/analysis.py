@@ -10,7 +10,7 @@ import pandas as pd
 from armlab.common.arrays import Array
 from bench.result_sets.result_set import ResultSet, runs_by_algorithm
 from bench.statistics import Summary, is_feasible, quantile, summarise
-from bench.statistics.critical_difference import CriticalDifference, critical_difference
+from bench.statistics.critical_difference import CriticalDifference, block_losses, critical_difference
 from bench.statistics.ends import quantile_interval, row_quantiles
 from bench.statistics.pairwise import Duel, duels, log_losses
 from bench.statistics.performance import (
@@ -57,6 +57,11 @@ class Cell:
     moments: Array
     targets: Array
     progress: Mapping[str, RunProgress]
+
+    @property
+    def problem(self) -> str:
+        """The label of its problem alone."""
+        return str(self.trials["problem"].iloc[0])
 
     @property
     def algorithms(self) -> list[str]:
@@ -116,6 +121,15 @@ def analyse_cells(results: ResultSet) -> list[Cell]:
         analyse_cell(label, trials, _sort_runs(runs_by_algorithm(trials, curves)))
         for label, trials, curves in results.cells()
     ]
+
+
+def losses_by_problem(cells: Sequence[Cell]) -> pd.DataFrame:
+    """Losses to rank: one row a problem, medians, averaged over its swarm sizes and budgets; one column an algorithm.
+
+    With one cell only, one row a repetition.
+    """
+    losses = block_losses([cell.losses for cell in cells])
+    return losses if len(cells) == 1 else losses.groupby([cell.problem for cell in cells], sort=False).mean()
 
 
 def analyse_cell(label: str, trials: pd.DataFrame, runs: Mapping[str, Sequence[Run]]) -> Cell:

@@ -20,13 +20,12 @@ from armlab.common.files import write_whole
 from armlab.common.report.page import render_page
 from armlab.common.report.palette import SeriesStyle, series_style
 from bench.report import sections
-from bench.report.analysis import Cell, analyse_cells, share_of_targets_reached
+from bench.report.analysis import Cell, analyse_cells, losses_by_problem, share_of_targets_reached
 from bench.report.ranking_chart import draw_critical_difference
 from bench.result_sets.formats import make_folder, read_results
 from bench.result_sets.result_set import ResultSet
 from bench.statistics.critical_difference import (
     CriticalDifference,
-    block_losses,
     critical_difference,
     paired_ranking,
 )
@@ -127,7 +126,8 @@ def report_page(results: ResultSet, cells: Sequence[Cell], facts: Sequence[Algor
     """The page as HTML; facts: properties of the algorithms that took part and are registered here."""
     looks = {name: series_style(index) for index, name in enumerate(results.algorithms)}
     losses = [cell.losses for cell in cells]
-    within, over = paired_ranking(losses), critical_difference(block_losses(losses))
+    within, over = paired_ranking(losses), critical_difference(losses_by_problem(cells))
+    is_sweep = over.blocks < len(cells) > 1
     data = page_data(cells, results.algorithms).replace("<", "\\u003c")  # a label must not end the script
     return render_page(
         __package__,
@@ -138,7 +138,8 @@ def report_page(results: ResultSet, cells: Sequence[Cell], facts: Sequence[Algor
         looks=looks,
         ranking=sections.ranking_text(within, cells),
         picture=draw_critical_difference(within, looks),
-        over_problems=_over_problems(over, looks) if len(cells) > 1 else None,
+        over_problems=None if len(cells) == 1 or over.blocks == 1 else _over_problems(over, looks),
+        noun="setting" if is_sweep else "problem",
         tally=sections.tally_table(cells, results.algorithms) if len(cells) > 1 else None,
         problems=[
             sections.ProblemPart(cell.label, sections.ends_table(cell), sections.duels_table(cell)) for cell in cells
@@ -161,7 +162,7 @@ def _read_asset(name: str) -> str:
 
 
 def write_report(where: Path, store: Path, out: Path | None) -> ResultLines:
-    """Write the page about results; tells the file, the table and who beats whom.
+    """Write the page about results; tells the table, who beats whom, and the file.
 
     Raises InputError, in one line, if there are no results.
     """
@@ -169,10 +170,9 @@ def write_report(where: Path, store: Path, out: Path | None) -> ResultLines:
     path = out or Path("results") / f"{results.name}_report.html"
     make_folder(path.parent)
     write_whole(path, report_page(results, analyse_cells(results), _measure_participants(results, store)))
-    document = yield from written_files([path])
     yield from results.missing
     yield from describe_frame(results.trials)
-    return document
+    return (yield from written_files([path]))
 
 
 def _measure_participants(results: ResultSet, store: Path) -> list[AlgorithmProperties]:

@@ -144,11 +144,18 @@ class Origin:
 def count_sentence(results: ResultSet, cells: Sequence[Cell]) -> str:
     """What was compared, and what of it failed or is missing."""
     trials = results.trials
-    counts = (
-        f"{count_of(len(cells), 'problem')}, {trials['algorithm'].nunique()} algorithms, "
-        f"{trials['repetition'].nunique()} repetitions, {len(trials)} runs."
-    )
-    return " ".join([counts, *(f"{gap}." for gap in results.gaps)])
+    problems, sizes = trials["problem"].nunique(), trials["swarm_size"].nunique()
+    budgets = int(trials.groupby("swarm_size")["budget"].nunique().max())  # which may follow the size
+    counts = [
+        count_of(problems, "problem"),
+        *([count_of(sizes, "swarm size")] if sizes > 1 else []),
+        *([count_of(budgets, "budget")] if budgets > 1 else []),
+        count_of(trials["algorithm"].nunique(), "algorithm"),
+        count_of(trials["repetition"].nunique(), "repetition"),
+        count_of(len(trials), "run"),
+    ]
+    sweep = "A setting is a problem with a swarm size and a budget." if len(cells) > problems else ""
+    return " ".join(filter(None, [f"{', '.join(counts)}.", sweep, *(f"{gap}." for gap in results.gaps)]))
 
 
 MAX_NAMED_PROBLEMS = 6  # of which the headline names the winners one by one
@@ -157,7 +164,8 @@ MAX_NAMED_PROBLEMS = 6  # of which the headline names the winners one by one
 def headline(cells: Sequence[Cell], within: CriticalDifference, over: CriticalDifference) -> tuple[str, str]:
     """Who has the best average rank on these problems, whom it beats and with whom it ties; then who beats whom, on
     each problem where they are few; and what holds for problems of this kind. within: from the paired runs. over: from
-    the medians of the problems.
+    the medians of the problems. Where the runs are too few for a test over all problems together, each problem has its
+    own.
     """
     best, *others = within.ranks
     if not others:
@@ -165,15 +173,32 @@ def headline(cells: Sequence[Cell], within: CriticalDifference, over: CriticalDi
     equal = [name for name in others if np.isclose(within.ranks[name], within.ranks[best])]
     leads = f"{join_words([best, *equal])} share" if equal else f"{best} has"
     first = f"{leads} the best average rank, {within.ranks[best]:.2f} of {len(within.ranks)}"
-    if within.has_too_few_blocks:
+    if within.has_too_few_blocks and len(cells) > 1:
+        first = f"{first}; {_count_wins(best, best if equal else 'it', cells)}."
+    elif within.has_too_few_blocks:
         first = f"{first}; {within.blocks} repetitions are too few to tell any pair apart."
     else:
         first = f"{first}: {best if equal else 'it'} {_wins_and_ties(best, within)}."
     if len(cells) == 1:
         return first, "" if within.has_too_few_blocks else _rest_sentence(within)
-    parts = [f"On {cell.label}: {_winners_on(cell)}." for cell in cells] if len(cells) <= MAX_NAMED_PROBLEMS else []
-    parts += [] if parts else [_rest_sentence(within)]
-    return first, " ".join([*parts, _generalisation(over)])
+    parts = []
+    if len(cells) <= MAX_NAMED_PROBLEMS and not all(cell.ranking.has_too_few_blocks for cell in cells):
+        parts = [f"On {cell.label}: {_winners_on(cell)}." for cell in cells]
+    elif not within.has_too_few_blocks:
+        parts = [_rest_sentence(within)]
+    return first, " ".join(filter(None, [*parts, _generalisation(over)]))
+
+
+def _count_wins(best: str, subject: str, cells: Sequence[Cell]) -> str:
+    """On how many problems each other one is beaten, by the tests of each problem. subject: the best, in words."""
+    if all(cell.ranking.has_too_few_blocks for cell in cells):
+        least = min(cell.ranking.blocks for cell in cells)
+        return f"{least} repetitions are too few to tell any pair apart on any of them"
+    others = [name for name in cells[0].algorithms if name != best]
+    counts = {name: sum(name in _beaten_by(best, cell.ranking) for cell in cells) for name in others}
+    told = [f"{name} on {count}" for name, count in counts.items() if count]
+    beaten = join_words(told) if told else "no other on any"
+    return f"tested one by one, {subject} beats {beaten} of {len(cells)}"
 
 
 def _wins_and_ties(best: str, found: CriticalDifference) -> str:
@@ -189,8 +214,18 @@ def _winners_on(cell: Cell) -> str:
     found = cell.ranking
     if found.has_too_few_blocks:
         return f"{found.blocks} repetitions are too few to tell any pair apart"
-    wins = [f"{name} beats {join_words(_beaten_by(name, found))}" for name in found.ranks if _beaten_by(name, found)]
+    wins = [
+        f"{name} beats {join_words(beaten)} ({_largest_p(name, beaten, found)})"
+        for name in found.ranks
+        if (beaten := _beaten_by(name, found))
+    ]
     return "; ".join(wins) or "no two are told apart"
+
+
+def _largest_p(name: str, beaten: Sequence[str], found: CriticalDifference) -> str:
+    """`p = 9e-07`, or the largest of several, after Holm's correction over the pairs of the problem."""
+    largest = max(found.p[name, other] for other in beaten)
+    return f"p {'=' if len(beaten) == 1 else 'at most'} {largest:.1g}"
 
 
 def _rest_sentence(found: CriticalDifference) -> str:
@@ -204,8 +239,10 @@ def _rest_sentence(found: CriticalDifference) -> str:
 
 def _generalisation(over: CriticalDifference) -> str:
     """What the problems say as a sample of others like them."""
+    if over.blocks == 1:
+        return ""
     if over.has_too_few_blocks:
-        return f"As a sample of others like them, {over.blocks} problems are too few to tell any pair apart."
+        return f"Nothing follows for other problems like them: {over.blocks} are too few."
     best = next(iter(over.ranks))
     return f"As a sample of others like them: {best} {_wins_and_ties(best, over)}."
 
@@ -224,21 +261,26 @@ def join_words(names: Sequence[str]) -> str:
 
 def ranking_text(within: CriticalDifference, cells: Sequence[Cell]) -> str:
     """How the ranks of paired runs were compared."""
-    problems = "" if len(cells) == 1 else f" of {len(cells)} problems"
-    told = "" if len(cells) == 1 else ", on at least one problem and on none the other way round"
-    return (
+    noun = "problem" if len({cell.problem for cell in cells}) == len(cells) else "setting"
+    problems = "" if len(cells) == 1 else f" of {len(cells)} {noun}s"
+    told = "" if len(cells) == 1 else f", on at least one {noun} and on none the other way round"
+    text = (
         f"Average ranks over the paired repetitions{problems}, 1 the best. A bar joins algorithms that cannot be told "
         f"apart: Wilcoxon's signed-rank test of every pair{told}, Holm's correction over all {within.tests}, 5 %."
     )
+    if within.has_too_few_blocks and len(cells) > 1:
+        text += f" After so many tests {within.blocks} repetitions tell no pair apart: see each {noun} below."
+    return text
 
 
 def generalisation_text(over: CriticalDifference) -> str:
     """How the ranks of medians over problems were compared."""
     text = (
         f"Average ranks of the medians of {over.blocks} problems: what may be expected of others like them. "
-        f"Holm's correction over all {over.tests} pairs, 5 %. Friedman's test that all are equal: "
-        f"p = {over.friedman_p:.2g}."
+        f"Holm's correction over {count_of(over.tests, 'pair')}, 5 %."
     )
+    if not np.isnan(over.friedman_p):
+        text += f" Friedman's test that all are equal: p = {over.friedman_p:.2g}."
     return f"{text} So few problems cannot tell any pair apart." if over.has_too_few_blocks else text
 
 

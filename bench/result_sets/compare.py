@@ -14,12 +14,12 @@ from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.statistics import adjust_by_holm
 from bench.result_sets.formats import read_results
-from bench.result_sets.result_set import CELL_COLUMNS, ResultSet
+from bench.result_sets.result_set import ResultSet
 from bench.statistics import is_feasible, quantile
 from bench.statistics.pairwise import log_losses, signed_rank_p
 from bench.statistics.superiority import superiority
 from bench.studies.regression.check import location_p_value
-from bench.tables import as_csv
+from bench.tables import CELL_COLUMNS, as_csv
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,9 @@ from armlab.common.settings import suggest_name
 from bench.files import file_name
 from bench.printed import display_name
 from bench.result_sets.formats import make_folder, read_results
-from bench.result_sets.result_set import CELL_COLUMNS
 from bench.statistics.power import power_text
 from bench.studies.beyond_paper.report import subject_duels_table
-from bench.tables import as_csv
+from bench.tables import CELL_COLUMNS, as_csv
 
 _READING = """\
 A12: chance that a run of {subject} ends better than one of the other, ties counting half, with its 95 %

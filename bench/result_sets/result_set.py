@@ -19,9 +19,8 @@ from bench.run import load_experiment
 from bench.statistics import is_feasible
 from bench.statistics.performance import Run
 from bench.store import open_store
-from bench.tables import entry_labels, failed_sentences, missing_sentences, tidy_frame
+from bench.tables import CELL_COLUMNS, cell_label, entry_labels, failed_sentences, missing_sentences, tidy_frame
 
-CELL_COLUMNS = ["problem", "swarm_size", "budget"]
 TRIAL_COLUMNS = [*CELL_COLUMNS, "algorithm", "repetition"]
 CellKey = tuple[Any, ...]
 """Problem, swarm size and budget."""
@@ -107,14 +106,7 @@ class ResultSet:
     def ends(self) -> Iterator[tuple[str, pd.DataFrame]]:
         """Label and trials of each problem, swarm size and budget."""
         for cell, trials in self.trials.groupby(CELL_COLUMNS, sort=False):
-            yield self._label(cell), trials
-
-    def _label(self, cell: CellKey) -> str:
-        problem, swarm_size, budget = cell
-        parts = [str(problem)]
-        parts += [f"{swarm_size} points"] if self.trials["swarm_size"].nunique() > 1 else []
-        parts += [f"{budget} evaluations"] if self.trials["budget"].nunique() > 1 else []
-        return ", ".join(parts)
+            yield cell_label(self.trials, cell), trials
 
 
 def runs_by_algorithm(trials: pd.DataFrame, curves: pd.DataFrame) -> dict[str, dict[int, Run]]:

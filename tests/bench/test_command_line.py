@@ -55,12 +55,12 @@ def test_a_misspelt_command_of_a_noun_is_refused_with_the_nearest() -> None:
     assert "Did you mean 'table3'?" in CliRunner().invoke(main, ["paper", "tabel3"]).stderr
 
 
-def test_run_writes_table_page_times_and_settings(armlab: Armlab, small: Path, tmp_path: Path) -> None:
+def test_run_prints_the_table_and_the_winner_then_the_files(armlab: Armlab, small: Path, tmp_path: Path) -> None:
     done = armlab("run", small)
     assert done.returncode == 0, done.stderr
     written = sorted(path.name for path in (tmp_path / "results").iterdir())
     assert written == ["small.csv", "small.md", "small.settings.yaml", "small_times.csv"]
-    files, told = done.stdout.splitlines()[:4], done.stdout.splitlines()[4:]
+    told, files = done.stdout.splitlines()[:-4], done.stdout.splitlines()[-4:]
     assert [Path(line).name for line in files] == ["small.csv", "small.md", "small_times.csv", "small.settings.yaml"]
     assert told[0].split()[:2] == ["algorithm", "median"]
     assert told[-1].endswith("3 repetitions are too few to tell any pair apart")

@@ -11,7 +11,7 @@ import pytest
 from small_results import CONFIG, Ran, ran
 
 from armlab.common.report.palette import series_style
-from bench.report.analysis import Cell, analyse_cell, analyse_cells
+from bench.report.analysis import Cell, analyse_cell, analyse_cells, losses_by_problem
 from bench.report.page import page_data, report_page, write_report
 from bench.report.ranking_chart import draw_critical_difference
 from bench.report.sections import ends_table, format_number, headline, tally_table
@@ -124,9 +124,35 @@ def test_a_page_of_two_problems_names_the_winners_on_each_and_says_that_two_stan
     results: ResultSet,
 ) -> None:
     page = report_page(results, analyse_cells(results), [])
-    assert "On sphere: " in page
+    assert re.search(r"On sphere: [a-z-]+ beats [a-z -]+ \(p (=|at most) 0\.0\d+\)", page)
     assert "On rastrigin: " in page
-    assert "2 problems are too few to tell any pair apart." in page
+    assert "Nothing follows for other problems like them: 2 are too few." in page
+
+
+def test_runs_too_few_for_a_test_over_all_problems_leave_what_each_problem_says() -> None:
+    """Six runs: with two algorithms p = 0.03 on one problem, and above 0.05 after a correction for six of them."""
+    trials = pd.DataFrame({"repetition": range(6), "value": np.arange(1.0, 7.0), "violation": 0.0, "seconds": 1.0})
+    one = pd.concat([trials.assign(algorithm="a"), trials.assign(algorithm="b", value=trials["value"] + 10)])
+    cells = [
+        Cell(f"p{k}", one.assign(problem=f"p{k}", swarm_size=5, budget=50), np.zeros(1), np.zeros(1), {"a": 0, "b": 0})
+        for k in range(6)
+    ]
+    within = paired_ranking([cell.losses for cell in cells])
+    assert within.has_too_few_blocks
+    first, second = headline(cells, within, critical_difference(losses_by_problem(cells)))
+    assert first == "a has the best average rank, 1.00 of 2; tested one by one, it beats b on 6 of 6."
+    assert second.startswith("On p0: a beats b (p = 0.03).")
+
+
+def test_swarm_sizes_of_one_problem_are_settings_and_no_problems(tmp_path: Path) -> None:
+    text = CONFIG.replace("swarm_size: 6", "swarm_size: [6, 12]")
+    swept = read_results(*ran(tmp_path, text))
+    cells = analyse_cells(swept)
+    assert losses_by_problem(cells).shape == (2, 3)
+    page = report_page(swept, cells, [])
+    assert "2 problems, 2 swarm sizes, 3 algorithms, 7 repetitions, 84 runs." in page
+    assert "<h3>Setting by setting</h3>" in page
+    assert "Average ranks of the medians of 2 problems" in page
 
 
 def test_two_algorithms_on_one_problem_have_a_winner(cell: Cell) -> None:

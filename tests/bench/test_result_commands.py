@@ -32,7 +32,7 @@ def test_share_then_report_and_compare_need_no_store(shell: CliRunner, small_run
     assert done.exit_code == 0
     assert "tables/trials.csv" in done.output
     done = shell.invoke(report, ["tables"], catch_exceptions=False)
-    assert done.output.startswith("results/small_report.html\n")
+    assert done.output.endswith("\nresults/small_report.html\n")
     assert "repetitions are too few" in done.output or "Wilcoxon" in done.output
     assert (tmp_path / "results" / "small_report.html").exists()
     done = shell.invoke(compare, ["tables", "tables"], catch_exceptions=False)

@@ -13,8 +13,8 @@ from bench.printed import display_name
 from bench.statistics import is_feasible, quantile
 from bench.statistics.pairwise import Duel, duel_row, duels, duels_against_all
 from bench.statistics.power import power_text
+from bench.tables import CELL_COLUMNS
 
-CELL_COLUMNS = ["problem", "swarm_size", "budget"]
 DuelChooser = Callable[[pd.DataFrame], list[Duel]]
 
 
