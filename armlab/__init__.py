@@ -2,30 +2,32 @@
 
     import armlab
 
-    recording = armlab.read_recording("my-recording")
+    recording = armlab.import_recording("log.csv", robot="arm.urdf")
     armlab.diagnose(recording)        # which physics the simulation leaves out
     armlab.identify(recording)        # the parameters of the arm
     armlab.search("joint-fourier")    # a motion that excites the dynamics
 
-A name is imported when it is first used, so `import armlab` takes milliseconds.
+A recording may be an object or the path of its folder. A name is imported when it is first used, so `import armlab`
+takes milliseconds.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING as _TYPE_CHECKING
 
-if TYPE_CHECKING:
+if _TYPE_CHECKING:
     from algorithms.contract import Box
     from algorithms.driver import minimise
     from algorithms.registry import load as load_algorithm
     from armlab.common.errors import InputError
-    from armlab.diagnosis.changes.comparison import Comparison, compare
-    from armlab.diagnosis.formats import read_verdict_file as read_verdict
-    from armlab.diagnosis.result import Diagnosis
+    from armlab.diagnosis.changes.comparison import Comparison
     from armlab.flows import ExperimentResult, Prediction, identify, predict, run_experiment, search
     from armlab.identification.model import Model
-    from armlab.recordings.load import load_recording as read_recording
+    from armlab.recordings.from_python import import_recording
+    from armlab.recordings.given import read_recording
+    from armlab.recordings.motion import MotionRecording
     from armlab.recordings.recording import Recording
-    from armlab.report.diagnose import diagnose
+    from armlab.report.diagnose import compare, diagnose
+    from armlab.report.verdict import Verdict, read_verdict
     from problem.arm import Arm
     from problem.registry import parse_problem
     from problem.robot_file import load_arm as read_robot
@@ -37,23 +39,25 @@ _PLACES = {
     "Arm": "problem.arm:Arm",
     "Box": "algorithms.contract:Box",
     "Comparison": "armlab.diagnosis.changes.comparison:Comparison",
-    "Diagnosis": "armlab.diagnosis.result:Diagnosis",
     "ExperimentResult": "armlab.flows:ExperimentResult",
     "InputError": "armlab.common.errors:InputError",
     "Model": "armlab.identification.model:Model",
+    "MotionRecording": "armlab.recordings.motion:MotionRecording",
     "Prediction": "armlab.flows:Prediction",
     "Recording": "armlab.recordings.recording:Recording",
-    "compare": "armlab.diagnosis.changes.comparison:compare",
+    "Verdict": "armlab.report.verdict:Verdict",
+    "compare": "armlab.report.diagnose:compare",
     "diagnose": "armlab.report.diagnose:diagnose",
     "identify": "armlab.flows:identify",
+    "import_recording": "armlab.recordings.from_python:import_recording",
     "load_algorithm": "algorithms.registry:load",
     "minimise": "algorithms.driver:minimise",
     "parse_problem": "problem.registry:parse_problem",
     "predict": "armlab.flows:predict",
     "read_model": "armlab.identification.model:Model.load",
-    "read_recording": "armlab.recordings.load:load_recording",
+    "read_recording": "armlab.recordings.given:read_recording",
     "read_robot": "problem.robot_file:load_arm",
-    "read_verdict": "armlab.diagnosis.formats:read_verdict_file",
+    "read_verdict": "armlab.report.verdict:read_verdict",
     "run_experiment": "armlab.flows:run_experiment",
     "search": "armlab.flows:search",
 }
@@ -62,16 +66,18 @@ __all__ = [
     "Arm",
     "Box",
     "Comparison",
-    "Diagnosis",
     "ExperimentResult",
     "InputError",
     "Model",
+    "MotionRecording",
     "Prediction",
     "Recording",
+    "Verdict",
     "__version__",
     "compare",
     "diagnose",
     "identify",
+    "import_recording",
     "load_algorithm",
     "minimise",
     "parse_problem",
@@ -85,22 +91,27 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """Import a public name at its first use."""
+    value: object
     if name == "__version__":
         from importlib.metadata import version
 
-        value: Any = version("armlab")
+        value = version("armlab")
     elif name in _PLACES:
         module, _, path = _PLACES[name].partition(":")
-        value = import_module(module)
+        value = _import_module(module)
         for part in path.split("."):
             value = getattr(value, part)
     else:
-        raise AttributeError(f"module 'armlab' has no attribute {name!r}")
+        from difflib import get_close_matches
+
+        close = get_close_matches(name, __all__, n=1, cutoff=0.5)
+        hint = f": did you mean '{close[0]}'?" if close else f": it has {', '.join(__all__)}"
+        raise AttributeError(f"module 'armlab' has no attribute {name!r}{hint if not name.startswith('_') else ''}")
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return list(__all__)

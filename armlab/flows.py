@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from importlib.metadata import version
+from itertools import combinations
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pandas as pd
@@ -20,25 +22,30 @@ from armlab.identification.identify import robot_path, wrong_reading
 from armlab.identification.model import Model
 from armlab.identification.torque_model import TorqueModel
 from armlab.identification.validation import RunError, format_percent, run_error
+from armlab.recordings.given import GivenRecording, torque_recording_of
 from armlab.recordings.identifiable import require_identifiable, require_possible, require_torque
 from armlab.recordings.recording import Recording
 from bench.config import find_algorithm, parse_params
 from bench.execute import Outcome, Trial, run_trial
-from bench.run import Progress, RunOptions, load_experiment
+from bench.run import Progress, RunOptions, load_experiment, run_missing
 from bench.run import run_experiment as write_experiment
+from bench.statistics.pairwise import duel_row, duels
 from bench.store import open_store
-from bench.tables import summary_table, tidy_frame
+from bench.tables import CELL_COLUMNS, summary_table, tidy_frame
+from bench.terminal import describe_frame, winner_sentences
+from problem.callables import CallableSettings
 from problem.registry import parse_problem
 
-SHOWN = 4  # runs or problems in a repr; the others are counted
+SHOWN = 4  # runs in a repr; the others are counted
+EVALUATIONS, SWARM_SIZE = 5000, 50  # of a search or an experiment that does not say
 
 
 def search(
     problem: str | Mapping[str, Any],
     algorithm: str = "l-shade",
     *,
-    evaluations: int = 5000,
-    swarm_size: int = 50,
+    evaluations: int = EVALUATIONS,
+    swarm_size: int = SWARM_SIZE,
     seed: int = 0,
     params: Mapping[str, Any] | None = None,
 ) -> Outcome:
@@ -64,43 +71,114 @@ class ExperimentResult:
 
     name: str
     trials: pd.DataFrame
-    files: tuple[Path, ...]
+    files: tuple[Path, ...] = ()
 
     @property
     def table(self) -> pd.DataFrame:
         """A row a problem, swarm size, budget and algorithm: minimum, median, quartiles, share of feasible ends."""
         return summary_table(self.trials)
 
+    @property
+    def duels(self) -> pd.DataFrame:
+        """A row a pair of algorithms on a problem, swarm size and budget: who is better, and how surely.
+
+        superiority: chance that an end of the subject is better than one of the rival (A12), with its 95 % interval,
+        low and high. p_holm: Wilcoxon's test over paired repetitions, Holm's correction over the pairs of a problem.
+        winner: empty where no difference is significant at 5 %.
+        """
+        groups = self.trials.groupby(CELL_COLUMNS, sort=False)
+        rows = [
+            dict(zip(CELL_COLUMNS, cell, strict=True)) | duel_row(duel)
+            for cell, frame in groups
+            for duel in duels(frame, list(combinations(frame["algorithm"].unique(), 2)))
+        ]
+        return pd.DataFrame(rows)
+
     def __repr__(self) -> str:
-        problems = self.trials.groupby("problem", sort=False)
-        lines = [f"Experiment {self.name!r}; trials: {len(self.trials)}, files: {len(self.files)}; medians:"]
-        for problem, rows in list(problems)[:SHOWN]:
-            medians = rows.groupby("algorithm", sort=False)["value"].median().sort_values()
-            lines.append(f"  {problem}: " + ", ".join(f"{name} {value:.4g}" for name, value in medians.items()))
-        return "\n".join(lines + _count_more(len(problems), "problems"))
+        """What was run, the table of medians and quartiles, and who beats whom."""
+        head = f"Experiment {self.name!r}; trials: {len(self.trials)}, files: {len(self.files)}"
+        return "\n".join([head, *(f"  {line}" for line in describe_frame(self.trials))])
 
     def _repr_html_(self) -> str:
         table = self.table
         shown = [name for name in table.columns if name not in ("average", "standard_deviation", "evaluations")]
         rows = [[f"{cell:.4g}" if isinstance(cell, float) else cell for cell in row] for row in table[shown].to_numpy()]
-        text = f"trials: {len(self.trials)}, files: {len(self.files)}"
+        text = " ".join(f"{sentence}." for sentence in winner_sentences(self.trials))
         return notebook_html(f"Experiment {self.name}", text, [name.replace("_", " ") for name in shown], rows)
 
 
-def run_experiment(
-    path: str | Path, results: str | Path = "results", store: str | Path = ".armlab/runs.sqlite", workers: int = 0
-) -> ExperimentResult:
-    """Run the missing trials of a configuration, write its tables and figures, and return all trials.
+DEFAULT_STORE = Path(".armlab/runs.sqlite")
 
-    results: folder of the tables and figures. store: file that keeps finished trials. workers: processes, as many as
-    there are cores if 0. Raises InputError, in one line, for a mistake in the configuration, and TrialsFailedError.
+
+def run_experiment(
+    configuration: str | Path | Mapping[str, Any] | None = None,
+    results: str | Path | None = None,
+    store: str | Path | None = None,
+    workers: int = 0,
+    **keys: Any,
+) -> ExperimentResult:
+    """Run the missing trials of an experiment, and return all of them.
+
+    configuration: a YAML file, or its keys as a dictionary or as keywords. problem may be a Python function of one
+    point (dimension,) that returns a number, not negative, with its box as `lower` and `upper`. As keywords, name,
+    seed, swarm_size and the budget may be left out, as in `search`. results: folder for tables and figures, which are
+    written only there. store: file that keeps finished trials, `.armlab/runs.sqlite` if left out; those of a function
+    are not kept, since nothing tells whether it changed. workers: processes, as many as there are cores if 0.
+    Raises InputError, in one line, for a mistake in the configuration, and TrialsFailedError.
     Set OPENBLAS_NUM_THREADS=1 before Python starts to get the files of the command line to the byte with one worker.
+
+        def cost(x):
+            return (x**2).sum()
+
+        armlab.run_experiment(problem=cost, lower=[-5, -5], upper=[5, 5], algorithms=["spso", "de"], repetitions=10)
     """
-    path, store = Path(path), Path(store)
-    files = write_experiment(path, RunOptions(store, Path(results), workers or cpu_count()), _no_bar)
-    loaded = load_experiment(path)
-    with open_store(store) as opened:
-        return ExperimentResult(loaded.experiment.name, tidy_frame(loaded.entries, opened), tuple(files))
+    source = _configuration(configuration, keys)
+    loaded, count = load_experiment(source), workers or cpu_count()
+    problems = {series.first.problem for series in loaded.entries.series}
+    functions = [settings.build() for settings in problems if isinstance(settings, CallableSettings)]
+    for function in functions:
+        function.try_once()
+    if functions and (results is not None or store is not None):
+        raise InputError(
+            f"problem {functions[0].name!r} is a function, and nothing tells whether it changed: leave out results and "
+            "store, or register it as a problem (plug-ins in the documentation)"
+        )
+    with TemporaryDirectory() if functions else nullcontext() as folder:
+        place = Path(folder) / "runs.sqlite" if folder else Path(store or DEFAULT_STORE)
+        experiment, files = loaded.experiment, list[Path]()
+        if results is not None:
+            files = write_experiment(source, RunOptions(place, Path(results), count), _no_bar)
+        with open_store(place) as opened:
+            if results is None:
+                timeout_s = experiment.trial_timeout_s
+                run_missing(loaded.entries, opened, count, executor=experiment.executor, timeout_s=timeout_s)
+            return ExperimentResult(experiment.name, tidy_frame(loaded.entries, opened), tuple(files))
+
+
+def _configuration(given: str | Path | Mapping[str, Any] | None, keys: dict[str, Any]) -> Path | Mapping[str, Any]:
+    """The file, or the keys with what keywords may leave out."""
+    if given is not None and keys:
+        raise InputError(f"give a configuration or its keys, not both: {', '.join(keys)} beside it")
+    if isinstance(given, Mapping):
+        return given
+    if isinstance(given, str | Path):
+        return Path(given)
+    if given is not None or not keys:
+        found = "nothing" if given is None else type(given).__name__
+        raise InputError(
+            "run_experiment takes a YAML file, a dictionary of its keys, or the keys themselves, as in "
+            f"problem='paper', algorithms=['spso', 'l-shade'], repetitions=10; not {found}"
+        )
+    if not isinstance(keys.get("bounds", ""), str):
+        raise InputError(
+            "bounds says what becomes of points outside the box: clip, reflect or wrap; give the box of a function as "
+            "lower=[...] and upper=[...]"
+        )
+    box = {name: keys.pop(name) for name in ("lower", "upper") if name in keys}
+    if box or callable(keys.get("problem")):
+        keys["problem"] = {"preset": keys.get("problem"), **box}
+    budget = {} if {"iterations", "evaluations"} & keys.keys() else {"evaluations": EVALUATIONS}
+    return {"name": "experiment", "swarm_size": SWARM_SIZE, "seed": 0, **budget, **keys}
 
 
 class _Silence:
@@ -113,7 +191,7 @@ def _no_bar(total: int, done: int) -> AbstractContextManager[Progress]:
 
 
 def identify(
-    recording: Recording,
+    recording: GivenRecording,
     method: str = "weighted",
     *,
     components: tuple[Candidate, ...] | None = None,
@@ -122,16 +200,17 @@ def identify(
 ) -> Model:
     """The model of the arm that fits the runs with the role `identify`, with 95 % intervals.
 
-    method: an estimator of `armlab identify --method`. components: viscous and Coulomb friction, rotor inertia and
-    offset at each joint if left out. cutoff_hz: of the low-pass, chosen from the positions if left out.
-    as_read: the recording and the robot file are not doubted. Raises InputError where no run identifies, where the runs
-    do not fit the arm, or where the recording is read wrongly.
+    recording: or the path of its folder. method: an estimator of `armlab identify --method`. components: viscous and
+    Coulomb friction, rotor inertia and offset at each joint if left out. cutoff_hz: of the low-pass, chosen from the
+    positions if left out. as_read: the recording and the robot file are not doubted. Raises InputError where no run
+    identifies, where the runs do not fit the arm, or where the recording is read wrongly.
 
-        model = armlab.identify(armlab.read_recording("my-recording"))
+        model = armlab.identify("my-recording")
         model.save("model.yaml")
     """
     if method not in METHODS:
         raise InputError(f"unknown method {method!r}: {suggest_name(method, list(METHODS))}")
+    recording = torque_recording_of(recording)
     require_identifiable(recording)
     runs = recording.runs_to_identify()
     wrong = None if as_read else wrong_reading(recording)
@@ -172,12 +251,17 @@ class Prediction:
         )
 
 
-def predict(model: TorqueModel, recording: Recording) -> Prediction:
+def predict(model: TorqueModel | str | Path, recording: GivenRecording) -> Prediction:
     """The torque of a model for every run of a recording, and its errors.
 
-    model: of `identify`, of a file, or `diagnosis.model`.
+    model: of `identify`, of a verdict, or the path of a `model.yaml`. recording: or the path of its folder.
     Raises InputError where the model has another number of joints than the recording, and for torque that is none.
     """
+    recording = torque_recording_of(recording)
+    if isinstance(model, str | Path):
+        model = Model.load(model)
+    if not isinstance(model, TorqueModel):
+        raise InputError(f"model should be a model, or the path of a model.yaml, not {type(model).__name__}")
     if len(model.arm) != len(recording.arm):
         raise InputError(f"the model has {len(model.arm)} joints, {recording.name} has {len(recording.arm)}")
     require_torque(recording)

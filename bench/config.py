@@ -3,6 +3,7 @@
 Types, hyper-parameters and names of algorithms are checked; every mistake is reported in one line.
 """
 
+from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_type_hints
@@ -14,6 +15,7 @@ from algorithms.registry import BrokenAlgorithmError, UnknownAlgorithmError, loa
 from armlab.common.errors import InputError
 from armlab.common.settings import Settings, read_yaml, validate
 from bench.executors.contract import ExecutorSettings
+from problem.callables import callable_name
 from problem.suite import instances, suites
 
 NAME_PATTERN = "[A-Za-z0-9][A-Za-z0-9_-]{0,99}"  # of an experiment: part of the names of its files
@@ -74,13 +76,14 @@ class ProblemChoice(Settings):
 
 
 def _split_label(value: Any) -> Any:
-    """Separates the key `label` from the keys of the problem; a bare name is a preset."""
-    if isinstance(value, str):
+    """Separates the key `label` from the keys of the problem; a bare name, or a function, is a preset."""
+    if isinstance(value, str) or callable(value):
         return _split_label({"preset": value})
     if not isinstance(value, dict):
         return value
     settings = {key: item for key, item in value.items() if key != "label"}
-    return {"label": value.get("label", value.get("preset", "problem")), "settings": settings}
+    preset = value.get("preset", "problem")
+    return {"label": value.get("label", callable_name(preset) if callable(preset) else preset), "settings": settings}
 
 
 PositiveInt = Annotated[int, Field(ge=1, le=10**9)]
@@ -152,9 +155,19 @@ class Experiment(Settings):
         return tuple(swarm_size * (iterations + 1) for iterations in self.iterations or ())
 
 
-def read_experiment(path: Path) -> Experiment:
-    """The experiment in a YAML file; raises InputError, in one line, for any mistake in it."""
-    return validate(Experiment, read_yaml(path), str(path))
+Configuration = Path | Mapping[str, Any]
+"""A YAML file, or its keys."""
+
+
+def place_of(configuration: Configuration) -> str:
+    """What a configuration is for the reader of a message."""
+    return str(configuration) if isinstance(configuration, Path) else "the configuration"
+
+
+def read_experiment(configuration: Configuration) -> Experiment:
+    """The experiment of a configuration; raises InputError, in one line, for any mistake in it."""
+    content = read_yaml(configuration) if isinstance(configuration, Path) else dict(configuration)
+    return validate(Experiment, content, place_of(configuration))
 
 
 def parse_params(params_type: type[Any], data: dict[str, Any], where: str) -> Any:

@@ -11,7 +11,7 @@ import yaml
 
 from algorithms.registry import is_our_code
 from armlab.common.documents import ResultLines
-from bench.config import Experiment, read_experiment
+from bench.config import Configuration, Experiment, place_of, read_experiment
 from bench.dispatch import claim_order, count_missing, count_missing_work, execute_missing, stream_reports
 from bench.errors import StoppedError, TrialsFailedError
 from bench.execute import Failure, Trial, stated_params
@@ -51,14 +51,14 @@ class RunOptions:
     executor: ExecutorSettings | None = None
 
 
-def run_experiment(path: Path, options: RunOptions, bar: ProgressBar) -> list[Path]:
+def run_experiment(configuration: Configuration, options: RunOptions, bar: ProgressBar) -> list[Path]:
     """Run the missing trials of a configuration and write its results; returns the written files.
 
     Where trials failed, the results of all others are written, with the failed ones counted as losses, and
     TrialsFailedError names the files. Raises InputError and StoppedError; finished trials stay in the store in any
     case.
     """
-    loaded = load_experiment(path)  # validate the configuration, plan its trials
+    loaded = load_experiment(configuration)  # validate the configuration, plan its trials
     experiment, entries = loaded.experiment, loaded.entries
     check_folder(options.results, experiment.name, loaded.settings, options.overwrite)
     with open_store(options.store) as store:
@@ -120,10 +120,10 @@ class LoadedExperiment:
     settings: str
 
 
-def load_experiment(path: Path) -> LoadedExperiment:
+def load_experiment(configuration: Configuration) -> LoadedExperiment:
     """Read and check a configuration and plan its trials; raises InputError, in one line, for any mistake in it."""
-    experiment = read_experiment(path)
-    entries = plan_trials(experiment, str(path))
+    experiment = read_experiment(configuration)
+    entries = plan_trials(experiment, place_of(configuration))
     return LoadedExperiment(experiment, entries, _settings_text(experiment, entries))
 
 
@@ -135,7 +135,11 @@ def _settings_text(experiment: Experiment, entries: Plan) -> str:
         entry.algorithm: {"name": entry.trial.algorithm, "params": stated_params(entry.trial.params)}
         for entry in firsts
     }
-    settings = experiment.model_dump(mode="json", exclude_none=True, exclude={"executor", "trial_timeout_s"})
+    settings = experiment.model_dump(
+        mode="json",
+        exclude_none=True,
+        exclude={"executor": True, "trial_timeout_s": True, "problem": {"__all__": {"settings"}}},
+    )
     settings |= {"problem": problems, "algorithms": algorithms}
     text: str = yaml.safe_dump(json.loads(json.dumps(settings)), sort_keys=False, allow_unicode=True)
     return text

@@ -1,5 +1,6 @@
 """What the value of a problem is, for the axes of figures."""
 
+from problem.callables import CallableSettings
 from problem.presets import FunctionSettings
 from problem.registry import ProblemSettings, is_plug_in
 
@@ -10,4 +11,4 @@ def value_name(problem: ProblemSettings) -> str:
     """The name of a problem's own value; a problem of another package may give it as `value_name` of its settings."""
     if is_plug_in(problem):
         return str(getattr(problem, "value_name", "value"))
-    return "function value (-)" if isinstance(problem, FunctionSettings) else CONDITION_NUMBER
+    return "function value (-)" if isinstance(problem, FunctionSettings | CallableSettings) else CONDITION_NUMBER

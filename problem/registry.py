@@ -11,6 +11,7 @@ from typing import Any
 from armlab.common.errors import InputError
 from armlab.common.plug_ins import BrokenPlugInError, load_plug_in
 from armlab.common.settings import Settings, suggest_name, validate
+from problem.callables import CallableSettings
 from problem.functions import FUNCTIONS
 from problem.presets import (
     FunctionSettings,
@@ -22,7 +23,7 @@ from problem.suite import InstanceSettings, instances, suites
 
 ENTRY_POINT_GROUP = "armlab.problems"
 
-ProblemSettings = PaperSettings | JointFourierSettings | FunctionSettings | InstanceSettings
+ProblemSettings = PaperSettings | JointFourierSettings | FunctionSettings | InstanceSettings | CallableSettings
 PRESETS: Mapping[str, type[ProblemSettings]] = MappingProxyType(
     {
         "paper": PaperSettings,
@@ -47,16 +48,20 @@ def plug_ins() -> list[EntryPoint]:
 
 def is_plug_in(settings: ProblemSettings) -> bool:
     """Whether settings are those of a plug-in's problem."""
-    return type(settings) not in PRESETS.values()
+    return type(settings) not in (*PRESETS.values(), CallableSettings)
 
 
 def parse_problem(data: Mapping[str, Any], where: str) -> ProblemSettings:
-    """Checked settings of `{preset: NAME, ...}`; where: what the data is, for the reader of an error.
+    """Checked settings of `{preset: NAME, ...}`, or with a Python function in the place of the name.
+
+    where: what the data is, for the reader of an error.
 
     Raises InputError, in one line, for an unknown preset or key, a value of the wrong type, or a plug-in that
     cannot be used.
     """
     preset = data.get("preset") if isinstance(data, Mapping) else None
+    if callable(preset):
+        return validate(CallableSettings, dict(data), where)
     if not isinstance(preset, str):
         raise InputError(f"{where}: should hold `preset: NAME`, one of {', '.join(names())}")
     return validate(settings_type(preset, where), dict(data), where)

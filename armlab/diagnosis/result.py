@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from armlab.common.arrays import Array
-from armlab.common.notebook import notebook_html
 from armlab.diagnosis.formats import Status
 from armlab.diagnosis.torque.evidence.evidence import Evidence
 from armlab.diagnosis.torque.rows.data import Observed
@@ -220,7 +219,7 @@ class JointFit:
         return self.filtered.after
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis:
     """Everything that the verdict, the model and the report are made of.
 
@@ -232,8 +231,7 @@ class Diagnosis:
     many candidates and shapes were compared. signs: warnings about limits, names, clock and standstill of the recording
     as it is. setup: how it is to be read, None where that was not asked; `recording` is then as it should be read.
     weighed: the names of each finding, and of what was not probable enough for one. reason: why no model was fitted,
-    empty where one was. unnamed: the joint that is predicted much better without any finding. summary: in words, empty
-    where only the engine was asked.
+    empty where one was. unnamed: the joint that is predicted much better without any finding.
     """
 
     recording: Recording
@@ -265,24 +263,4 @@ class Diagnosis:
     setup_seconds: float = 0.0
     weighed: tuple[Weighed, ...] = ()
     unnamed: JointFit | None = None
-    summary: str = ""
     settings: dict[str, float | str | bool] = field(default_factory=dict)
-
-    def __repr__(self) -> str:
-        """The status, the first claims as effect@place with their equations, and how many there are."""
-        lines = [f"Diagnosis of {self.recording.name!r}: {self.status}; claims: {len(self.claims)}"]
-        lines += [f"  setup: {each.text}" for each in (self.setup.findings if self.setup else ())]
-        for claim in self.claims[:4]:
-            place = "" if claim.joint is None else f"@{claim.joint}"
-            lines.append(f"  {claim.effect}{place}: {claim.equation}")
-        if len(self.claims) > 4:
-            lines.append(f"  and {len(self.claims) - 4} more claims")
-        return "\n".join(lines if self.claims else [*lines, f"  {self.summary or self.reason}"])
-
-    def _repr_html_(self) -> str:
-        rows: list[tuple[object, ...]] = [
-            ("setup", "", each.text) for each in (self.setup.findings if self.setup else ())
-        ]
-        rows += [(each.effect, "" if each.joint is None else each.joint, each.equation) for each in self.claims]
-        title = f"Diagnosis of {self.recording.name}: {self.status}"
-        return notebook_html(title, self.summary or self.reason, ("effect", "joint", "equation"), rows)

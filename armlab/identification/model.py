@@ -10,7 +10,7 @@ from armlab.recordings.differentiate import Signals
 from armlab.recordings.recording import Run
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from armlab.common.report.figures import ShownFigure
 
 FIGURE_WIDTH, ROW_HEIGHT = 11.0, 1.5  # inches
 
@@ -27,17 +27,17 @@ class Model(TorqueModel):
         """The model of a `model.yaml`; InputError, in one line, where it is wrong."""
         return cls(**vars(read_model(Path(path))))
 
-    def plot(self, run: Run) -> "Figure":
+    def plot(self, run: Run) -> "ShownFigure":
         """A figure of recorded and predicted torque and what is left, joint by joint."""
         return residual_figure(self, self.signals(run))
 
 
-def residual_figure(model: TorqueModel, signals: Signals) -> "Figure":
+def residual_figure(model: TorqueModel, signals: Signals) -> "ShownFigure":
     """Recorded and predicted torque, and what is left, joint by joint."""
-    from matplotlib.figure import Figure  # loaded by those who draw
+    from armlab.common.report.figures import ShownFigure  # matplotlib is loaded by those who draw
 
     predicted, joints = model.filtered_torque(signals), len(model.arm)
-    figure = Figure((FIGURE_WIDTH, ROW_HEIGHT * joints + 0.6), layout="constrained")
+    figure = ShownFigure((FIGURE_WIDTH, ROW_HEIGHT * joints + 0.6), layout="constrained")
     axes = figure.subplots(joints, 2, sharex=True, squeeze=False)
     for joint, (left, right) in enumerate(axes):
         unit = "N m" if model.arm.joints[joint].kind == "revolute" else "N"

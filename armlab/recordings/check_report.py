@@ -12,6 +12,7 @@ from matplotlib.ticker import NullFormatter
 from armlab.common.arrays import Array
 from armlab.common.files import write_whole
 from armlab.common.report import palette
+from armlab.common.report.figures import ShownFigure
 from armlab.common.report.page import png_address, render_page
 from armlab.common.report.palette import figure_style, series_style
 from armlab.common.report.wording import count_of
@@ -26,7 +27,7 @@ FIGURE_WIDTH_IN, ROW_HEIGHT_IN = 11.0, 1.5  # inches
 RAW_COLOR, FILTERED_COLOR, LIMIT_COLOR = palette.STROKE, palette.BLUE, palette.VERMILION
 
 
-def draw_signals(signals: Signals, arm: Arm) -> Figure:
+def draw_signals(signals: Signals, arm: Arm) -> ShownFigure:
     """Position and torque of each joint over time, as recorded and filtered."""
     run = signals.run
 
@@ -39,7 +40,7 @@ def draw_signals(signals: Signals, arm: Arm) -> Figure:
     return _draw_joints(run, arm, ("position", "torque"), draw)
 
 
-def draw_motion(run: MotionRun, arm: Arm) -> Figure:
+def draw_motion(run: MotionRun, arm: Arm) -> ShownFigure:
     """Position with the command, and their difference, of each joint over time."""
     command = run.reference_position
     assert command is not None
@@ -53,9 +54,11 @@ def draw_motion(run: MotionRun, arm: Arm) -> Figure:
     return _draw_joints(run, arm, ("command and position", "command - position"), draw)
 
 
-def _draw_joints(run: MotionRun, arm: Arm, titles: tuple[str, str], draw: Callable[[Axes, Axes, int], None]) -> Figure:
+def _draw_joints(
+    run: MotionRun, arm: Arm, titles: tuple[str, str], draw: Callable[[Axes, Axes, int], None]
+) -> ShownFigure:
     """Two panels for each joint; draw: fills both of a joint, the left one with its positions."""
-    figure = Figure((FIGURE_WIDTH_IN, ROW_HEIGHT_IN * run.joints + 0.6), layout="constrained")
+    figure = ShownFigure((FIGURE_WIDTH_IN, ROW_HEIGHT_IN * run.joints + 0.6), layout="constrained")
     axes = figure.subplots(run.joints, 2, sharex=True, squeeze=False)
     for joint, (left, right) in enumerate(axes):
         draw(left, right, joint)

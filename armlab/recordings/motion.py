@@ -3,12 +3,13 @@
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
 from armlab.recordings.channels import channel_units, make_raw_motion_run, make_transmission
 from armlab.recordings.load import RepairPlaces, repair_run
-from armlab.recordings.recording import Finding, MotionRun, Role, Transmission
+from armlab.recordings.recording import Finding, MotionRun, Role, Transmission, describe_runs
 from armlab.recordings.recording_file import (
     FILE_NAME,
     ControllerEntry,
@@ -22,6 +23,11 @@ from problem.coupled_joints import refuse_coupled
 from problem.mjcf import compile_mjcf
 from problem.mjcf_servos import refuse_other_drives
 from problem.robot_file import load_arm
+
+if TYPE_CHECKING:  # by those who ask for frames or figures
+    import pandas as pd
+
+    from armlab.common.report.figures import ShownFigure
 
 PER_JOINT_KEYS = (
     "kp",
@@ -67,6 +73,23 @@ class MotionRecording:
     def recorded_arm(self) -> Arm:
         """The joints that the columns belong to, as an arm without links: names, kinds and limits."""
         return Arm(self.arm.name, tuple(self.arm.joints[joint] for joint in self.joints))
+
+    def __getitem__(self, signal: str) -> "pd.DataFrame":
+        """A signal of all runs, SI units: rows by run and time, a column a joint."""
+        from armlab.recordings.views import signal_frame
+
+        return signal_frame(self.runs, self.recorded_arm, signal)
+
+    def plot(self, run: str | None = None) -> "ShownFigure":
+        """A figure of command and position of each joint. run: its name, the first if left out."""
+        from armlab.recordings.views import plot_run, run_named
+
+        return plot_run(run_named(self.runs, run), self.recorded_arm)
+
+    def __repr__(self) -> str:
+        """The robot, the runs, and how many findings there are."""
+        title = f"Motion recording {self.name!r} of {self.arm.name}; joints: {len(self.joints)}"
+        return describe_runs(title, self.runs, self.findings)
 
     def with_role(self, role: Role) -> tuple[MotionRun, ...]:
         """The runs that identify, or those that validate."""

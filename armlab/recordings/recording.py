@@ -1,9 +1,10 @@
 """A recording: an arm, its runs in SI units on the joint side, and remarks about them."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import Any, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,13 @@ from numpy.typing import NDArray
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from problem.arm import Arm
+
+if TYPE_CHECKING:  # by those who ask for frames or figures
+    import pandas as pd
+
+    from armlab.common.report.figures import ShownFigure
+    from armlab.recordings.from_python import ImportOptions
+    from armlab.recordings.motion import MotionRecording
 
 Role = Literal["identify", "validate"]
 ROLES: tuple[Role, ...] = ("identify", "validate")
@@ -167,21 +175,54 @@ class Recording:
     findings: tuple[Finding, ...] = ()
     recorded: date | None = None
 
+    @classmethod
+    def from_dataframe(
+        cls,
+        frame: "pd.DataFrame | Sequence[pd.DataFrame] | Mapping[Any, pd.DataFrame]",
+        robot: str | Path | None = None,
+        *,
+        validate: Any = None,
+        out: str | Path | None = None,
+        **options: "Unpack[ImportOptions]",
+    ) -> "Recording | MotionRecording":
+        """The recording in a DataFrame, or in several, one a run: a list, or a dictionary by the names of the runs.
+
+        robot: a built-in name or a robot file. validate: what takes no part in any fit: other frames, or, for a single
+        frame, True for its rows, such as `frame["t"] > 30`; each stretch of rows is a run. options: columns by signal,
+        units and the others of `import_recording`, needed only where names do not tell; an index that is no bare count
+        is a column, too. Checked, refused and repaired as the same numbers in a file would be; the findings say what
+        each signal was taken from. out: new folder that keeps it. Without torque, and with reference_position, it is a
+        MotionRecording. Raises InputError, in one line.
+
+            Recording.from_dataframe(frame, robot="arm.urdf", position="q*", torque="tau*", units={"torque": "N.m"})
+        """
+        from armlab.recordings.from_python import recording_of_frames
+
+        return recording_of_frames(frame, robot, validate=validate, out=out, **options)
+
     @property
     def name(self) -> str:
         """Name of the folder."""
         return self.folder.resolve().name
 
+    def __getitem__(self, signal: str) -> "pd.DataFrame":
+        """A signal of all runs, SI units: rows by run and time, a column a joint; `recording["torque"].loc["run.csv"]`
+        is that of one run.
+        """
+        from armlab.recordings.views import signal_frame
+
+        return signal_frame(self.runs, self.arm, signal)
+
+    def plot(self, run: str | None = None) -> "ShownFigure":
+        """A figure of position and torque, recorded and filtered. run: its name, the first if left out."""
+        from armlab.recordings.views import plot_run, run_named
+
+        return plot_run(run_named(self.runs, run), self.arm)
+
     def __repr__(self) -> str:
         """The robot, the first runs, and how many findings there are."""
-        lines = [f"Recording {self.name!r} of {self.arm.name}; joints: {len(self.arm)}, runs: {len(self.runs)}"]
-        for run in self.runs[:3]:
-            lines.append(f"  {run.name} ({run.role}): {run.samples} samples at {run.rate_hz:.5g} Hz")
-        if len(self.runs) > 3:
-            lines.append(f"  and {len(self.runs) - 3} more runs")
-        found = [each.severity for each in (*self.findings, *(each for run in self.runs for each in run.findings))]
-        lines.append(f"  findings: {found.count('repaired')} repairs, {found.count('warning')} warnings")
-        return "\n".join(lines)
+        title = f"Recording {self.name!r} of {self.arm.name}; joints: {len(self.arm)}"
+        return describe_runs(title, self.runs, self.findings)
 
     def with_role(self, role: Role) -> tuple[Run, ...]:
         """The runs that identify, or those that validate."""
@@ -193,3 +234,14 @@ class Recording:
         if not runs:
             raise InputError(f"{self.folder} has no run to identify from: give one of its runs the role identify")
         return runs
+
+
+def describe_runs(title: str, runs: Sequence[MotionRun], findings: Sequence[Finding]) -> str:
+    """A title, the first runs of a recording, and how many repairs and warnings there are."""
+    lines = [f"{title}, runs: {len(runs)}"]
+    for run in runs[:3]:
+        lines.append(f"  {run.name} ({run.role}): {run.samples} samples at {run.rate_hz:.5g} Hz")
+    if len(runs) > 3:
+        lines.append(f"  and {len(runs) - 3} more runs")
+    found = [each.severity for each in (*findings, *(each for run in runs for each in run.findings))]
+    return "\n".join([*lines, f"  findings: {found.count('repaired')} repairs, {found.count('warning')} warnings"])

@@ -1,26 +1,61 @@
-"""The diagnosis of a recording with its summary in words, for scripts and notebooks."""
+"""The diagnosis of a recording as a verdict, and what changed between recordings, for scripts and notebooks."""
 
-from dataclasses import replace
+from collections.abc import Sequence
+from datetime import date
 
-from armlab.diagnosis.result import Diagnosis
+from armlab.common.errors import DataError, InputError
+from armlab.diagnosis.changes import comparison as changes
+from armlab.diagnosis.motion.diagnose import diagnose_motion
 from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.torque import diagnose as engine
-from armlab.recordings.recording import Recording
-from armlab.report.account.summary import summary_of
+from armlab.recordings.given import GivenRecording, recording_of, torque_recording_of
+from armlab.recordings.motion import MotionRecording
+from armlab.report.motion.verdict import make_motion_verdict
+from armlab.report.verdict import Verdict, verdict_of
+from armlab.report.verdict_files import make_verdict
 
 
 def diagnose(
-    recording: Recording,
+    recording: GivenRecording,
     baseline: Baseline | None = None,
     seed: int = 0,
     settings: Settings | None = None,
     as_read: bool = False,
-) -> Diagnosis:
-    """Where the simulation and the recording differ, and what physics is missing, with a summary in words.
+) -> Verdict:
+    """Where the simulation and the recording differ, and what physics is missing.
 
-    Arguments and errors: those of `armlab.diagnosis.torque.diagnose.diagnose`.
+    recording: or the path of its folder. baseline: what is compared; the simulation where there is one if left out.
+    seed: of the surrogates' random waves. as_read: the recording and the robot file are not doubted. A recording of
+    motion only has none of these. Raises InputError, in one line, for a recording that cannot be used.
 
-        print(armlab.diagnose(armlab.read_recording("my-recording")).summary)
+        verdict = armlab.diagnose("my-recording")
+        print(verdict.summary)
     """
-    found = engine.diagnose(recording, baseline, seed, settings, as_read=as_read)
-    return replace(found, summary=summary_of(found))
+    known = recording_of(recording)
+    if isinstance(known, MotionRecording):
+        if baseline is not None or settings is not None or as_read:
+            raise InputError(f"{known.name} is of motion only: leave out baseline, settings and as_read")
+        servos = diagnose_motion(known)
+        return verdict_of(make_motion_verdict(servos), servos, None)
+    try:
+        found = engine.diagnose(known, baseline, seed, settings, as_read=as_read)
+    except DataError as error:
+        raise InputError(f"{known.folder}: {error}") from None
+    return verdict_of(make_verdict(found), found, None)
+
+
+def compare(
+    old: GivenRecording,
+    new: GivenRecording,
+    *more: GivenRecording,
+    baseline: Baseline | None = None,
+    seed: int = 0,
+    dates: Sequence[date] = (),
+) -> changes.Comparison:
+    """What changed from the first recording of a robot to the later ones.
+
+    old, new, more: recordings with torque, or the paths of their folders. dates: of the recordings; those of their
+    files if left out. Raises InputError where the recordings are not of one robot, or dates are not as many.
+    """
+    first, second, *others = map(torque_recording_of, (old, new, *more))
+    return changes.compare(first, second, *others, baseline=baseline, seed=seed, dates=dates)

@@ -18,7 +18,6 @@ from armlab.cli.output import prints_result, tell_progress
 from armlab.common.documents import FailedResultError, json_text
 from armlab.common.markdown import latex_table
 from armlab.diagnosis.formats import VerdictFile
-from armlab.diagnosis.result import Diagnosis
 
 EXPERIMENT = "{name: mine, problem: sphere, algorithms: [de], swarm_size: 5, evaluations: 20, repetitions: 2, seed: 1}"
 
@@ -194,15 +193,6 @@ def test_click_completes_commands_and_options_in_a_shell():
     place = {"PYTHONPATH": str(Path(armlab.__file__).parents[1])}
     done = subprocess.run(command, env=place | words, capture_output=True, text=True, check=False)
     assert done.stdout.strip() == "plain,--json"
-
-
-def test_a_diagnosis_shows_itself_escaped_in_a_notebook(recording):
-    claims = [SimpleNamespace(effect="friction<b>", joint=joint, equation="tau < 1") for joint in range(1, 20)]
-    html = Diagnosis(recording, None, "mismatch", "Much <script>", claims=tuple(claims))._repr_html_()
-    assert "<td>friction&lt;b&gt;</td><td>1</td><td>tau &lt; 1</td>" in html
-    assert "Much &lt;script&gt;" in html
-    assert html.count("<tr>") == 13
-    assert "and 7 more" in html
 
 
 def test_results_of_an_experiment_and_a_prediction_show_tables_in_a_notebook(recording):

@@ -188,6 +188,16 @@ class Level:
 Layer = Line | Points | Level
 
 
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """What a chart shows, however it is drawn."""
+
+    title: str
+    x: Axis
+    y: Axis
+    layers: Sequence[Layer]
+
+
 def draw_chart(
     title: str, x: Axis, y: Axis, layers: Sequence[Layer], about: str = "", height: float = CHART_HEIGHT
 ) -> Markup:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
+from armlab.common.report.charts import draw_chart
 from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.effects.library import effect_named
 from armlab.report.account.account import account_of
@@ -16,7 +17,7 @@ from armlab.report.torque.torque_pictures import (
     draw_errors_by_joint,
     draw_evidence,
     draw_located_errors,
-    draw_torques,
+    torque_charts,
 )
 from armlab.report.words import SOMETHING_UNKNOWN, claim_in_words
 
@@ -68,7 +69,7 @@ def draw_gallery(diagnosis: Diagnosis, data: ShownResiduals) -> Gallery:
         data,
         draw_arm(arm, position, joint_marks(diagnosis), whole),
         draw_errors_by_joint(diagnosis, data),
-        draw_torques(diagnosis, data),
+        [draw_chart(each.title, each.x, each.y, each.layers) for each in torque_charts(diagnosis, data)],
         draw_errors(diagnosis, data),
         [(claim, draw_evidence(diagnosis, data, claim)) for claim in diagnosis.claims],
         located,

@@ -23,6 +23,7 @@ from armlab.common.report.charts import (
     RIGHT_MARGIN,
     SURROGATE_LOOK,
     Axis,
+    Chart,
     Layer,
     Level,
     Line,
@@ -119,8 +120,8 @@ def _draw_mark(x: float, y: float, look: Look) -> str:
     return svg_element("path", d=f"M{x:.1f} {y - 9:.1f}v18", stroke=look.color, stroke_width=2.4)
 
 
-def draw_torques(diagnosis: Diagnosis, data: ShownResiduals) -> list[Markup]:
-    """One picture a joint: measured torque and that of each model, where the held-out error falls most."""
+def torque_charts(diagnosis: Diagnosis, data: ShownResiduals) -> list[Chart]:
+    """One chart a joint: measured torque and that of each model, where the held-out error falls most."""
     segment, rows = clearest_stretch(data, STRETCH_SECONDS)
     time, torque = data.observed.time[rows], data.observed.torque
     run = data.observed.names[segment.run]
@@ -130,14 +131,13 @@ def draw_torques(diagnosis: Diagnosis, data: ShownResiduals) -> list[Markup]:
     out = []
     for joint in range(torque.shape[1]):
         measured = torque[rows, joint]
-        lines: list[Layer] = [Line(time, measured, MEASURED_LOOK)]
+        lines = [Line(time, measured, MEASURED_LOOK)]
         lines += [Line(time, measured - left[rows, joint], look) for look, left in models]
         size = joint_unit(diagnosis.simulation.arm, joint)
-        values = [each.y for each in lines if isinstance(each, Line)]
-        y = fit_axis(f"{'torque' if size == 'N m' else 'force'}, {size}", *values)
+        y = fit_axis(f"{'torque' if size == 'N m' else 'force'}, {size}", *(each.y for each in lines))
         x = Axis(f"time in {shorten_name(run)}, s", float(time[0]), float(time[-1]))
         title = f"{shorten_name(joint_at_start(diagnosis.simulation.arm, joint + 1))}: measured and predicted"
-        out.append(draw_chart(title, x, y, lines))
+        out.append(Chart(title, x, y, lines))
     return out
 
 
