@@ -97,8 +97,9 @@ speed: .venv/dev ## how fast, beside Pinocchio, CasADi, mealpy, pygmo and scipy:
 docs: .venv/dev ## the documentation site, strictly: site/index.html
 	$(BIN)/python -m tools.site site
 
-pictures: .venv/dev ## the pictures of README and tutorials: docs/pictures/
+pictures: .venv/dev ## the pictures of README and tutorials, docs/pictures/, and the outputs of the notebooks
 	$(BIN)/python -m tools.site.pictures
+	$(BIN)/python -m tools.site.notebooks
 
 # --- checks
 

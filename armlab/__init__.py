@@ -20,7 +20,8 @@ if _TYPE_CHECKING:
     from algorithms.registry import load as load_algorithm
     from armlab.common.errors import InputError
     from armlab.diagnosis.changes.comparison import Comparison
-    from armlab.flows import ExperimentResult, Prediction, identify, predict, run_experiment, search
+    from armlab.experiments import ExperimentResult, run_experiment, search
+    from armlab.flows import Prediction, identify, predict
     from armlab.identification.model import Model
     from armlab.recordings.from_python import import_recording
     from armlab.recordings.given import read_recording
@@ -39,7 +40,7 @@ _PLACES = {
     "Arm": "problem.arm:Arm",
     "Box": "algorithms.contract:Box",
     "Comparison": "armlab.diagnosis.changes.comparison:Comparison",
-    "ExperimentResult": "armlab.flows:ExperimentResult",
+    "ExperimentResult": "armlab.experiments:ExperimentResult",
     "InputError": "armlab.common.errors:InputError",
     "Model": "armlab.identification.model:Model",
     "MotionRecording": "armlab.recordings.motion:MotionRecording",
@@ -58,8 +59,8 @@ _PLACES = {
     "read_recording": "armlab.recordings.given:read_recording",
     "read_robot": "problem.robot_file:load_arm",
     "read_verdict": "armlab.report.verdict:read_verdict",
-    "run_experiment": "armlab.flows:run_experiment",
-    "search": "armlab.flows:search",
+    "run_experiment": "armlab.experiments:run_experiment",
+    "search": "armlab.experiments:search",
 }
 
 __all__ = [

@@ -2,10 +2,9 @@
 
 import ast
 import json
-import os
 import re
-import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import click
@@ -24,7 +23,7 @@ DOCUMENTS = [
     ROOT / "docs" / "running.md",
     ROOT / "results" / "README.md",
 ]
-TUTORIALS = [ROOT / "docs" / "tutorials" / name for name in ("csv.md", "algorithm.md")]
+WITH_EXAMPLES = [ROOT / "docs" / name for name in ("tutorials/csv.md", "tutorials/algorithm.md", "python.md")]
 GENERATED = re.compile(r"(?:\.\./)?(?:gallery|reference)/")  # pages of the site that come from the code
 PAGES = [*(ROOT / "docs").glob("*.md"), *(ROOT / "docs").glob("tutorials/*.md")]
 FOLDERS = "problem|algorithms|bench|armlab|tests|docs|configs|results|templates"
@@ -67,7 +66,7 @@ def test_the_layers_picture_allows_every_import():
     packages = sorted((name for name in below if not name.startswith("users")), key=len, reverse=True)
 
     def package_of(module):
-        if module in ("armlab", "armlab.flows") or module.startswith("armlab.schemas"):
+        if module in ("armlab", "armlab.experiments", "armlab.flows") or module.startswith("armlab.schemas"):
             return "armlab"
         return next((name for name in packages if name != "armlab" and f"{module}.".startswith(f"{name}.")), None)
 
@@ -106,31 +105,28 @@ def test_make_targets_of_the_readme_exist():
         assert set(re.findall(r"(?:^|`)make ([a-z0-9-]+)", path.read_text(encoding="utf-8"), re.MULTILINE)) <= targets
 
 
-PYTHON_EXAMPLES = re.findall(
-    r"```python\n(.*?)```", (ROOT / "docs" / "python.md").read_text(encoding="utf-8"), re.DOTALL
-)
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
+MAX_NOTEBOOK_BYTES = 400_000
 
 
-def test_the_python_examples_of_the_front_door_run(tmp_path, recording_folder):
-    assert len(PYTHON_EXAMPLES) == 2
-    recording_folder(tmp_path / "my-recording")
-    (tmp_path / "mine.yaml").write_text(
-        "{name: mine, problem: sphere, algorithms: [de], swarm_size: 10, evaluations: 100, repetitions: 2, seed: 1}"
-    )
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
-    for example in PYTHON_EXAMPLES:
-        done = subprocess.run(
-            [sys.executable, "-c", example], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 0, done.stderr
-        assert done.stdout
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_keeps_what_its_cells_showed_in_a_small_file(path):
+    text = path.read_text(encoding="utf-8")
+    cells = [cell for cell in json.loads(text)["cells"] if cell["cell_type"] == "code"]
+    assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
+    silent = [cell for cell in cells if not cell["outputs"]]
+    assert all(cell["source"][-1].startswith("check_algorithm(") for cell in silent)
+    kinds = {output["output_type"] for cell in cells for output in cell["outputs"]}
+    assert kinds <= {"execute_result", "display_data"}  # no error, no warning
+    assert len(text) < MAX_NOTEBOOK_BYTES
+    assert tempfile.gettempdir() not in text
 
 
-def test_the_examples_of_readme_and_tutorials_run(tmp_path, monkeypatch):
+def test_the_examples_of_readme_tutorials_and_python_run(tmp_path, monkeypatch):
     """All in one folder; a command that another document has, too, is run once."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))
-    steps = dict.fromkeys(step for path in (*TUTORIALS, ROOT / "README.md") for step in read_steps(path))
+    steps = dict.fromkeys(step for path in (*WITH_EXAMPLES, ROOT / "README.md") for step in read_steps(path))
     assert {step.kind for step in steps} == {"file", "command", "script"}
     printed = {step.text: run_step(step) for step in steps}
     verdict = json.loads(Path("verdict/verdict.json").read_text(encoding="utf-8"))
@@ -140,3 +136,4 @@ def test_the_examples_of_readme_and_tutorials_run(tmp_path, monkeypatch):
     assert "shrinking-search keeps its promises" in printed["armlab check shrinking-search"]
     assert Path("corrected.xml").is_file()
     assert Path("figures/comparison_ends.svg").is_file()
+    assert any(text.endswith("True\n") for text in printed.values())  # what was read is what was found

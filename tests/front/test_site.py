@@ -54,9 +54,8 @@ NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_each_cell_of_a_notebook_is_run_at_the_build_and_none_keeps_an_output(path, site):
+def test_each_cell_of_a_notebook_is_run_at_the_build_and_shows_something(path, site):
     cells = [cell for cell in json.loads(path.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == "code"]
-    assert [cell for cell in cells if cell["outputs"] or cell["execution_count"]] == []
     page = (site / "notebooks" / f"{path.stem}.html").read_text(encoding="utf-8")
     silent = [cell for cell in cells if cell["source"][-1].startswith("check_algorithm(")]
     assert page.count('class="cell_output') == len(cells) - len(silent)
@@ -64,7 +63,8 @@ def test_each_cell_of_a_notebook_is_run_at_the_build_and_none_keeps_an_output(pa
 
 def test_the_notebook_of_a_diagnosis_shows_what_the_log_hides(site):
     page = (site / "notebooks" / "diagnosis.html").read_text(encoding="utf-8")
-    assert set(re.findall(r"<td>([a-z_]+)</td>", _tables(page)[0])) == {effect for effect, _, _ in HIDDEN}
+    verdict = next(table for table in _tables(page) if "<th>equation</th>" in table)
+    assert set(re.findall(r"<td>([a-z_]+)</td>", verdict)) == {effect for effect, _, _ in HIDDEN}
 
 
 def test_the_notebook_of_a_comparison_shows_its_experiment_as_a_table(site):

@@ -14,6 +14,7 @@ from armlab.common.report.charts import FLOOR_LOOK, GIVEN_LOOK, REFITTED_LOOK, C
 from armlab.common.report.palette import figure_style
 
 CHART_SIZE_IN = (7.0, 3.2)
+NOTEBOOK_DPI = 72  # as matplotlib has it in notebooks
 MARKS = {GIVEN_LOOK: "s", REFITTED_LOOK: "o", FLOOR_LOOK: "|"}  # as on the pages; a disc for every other look
 
 
@@ -22,7 +23,7 @@ class ShownFigure(Figure):
 
     def _repr_png_(self) -> bytes:
         buffer = BytesIO()
-        self.savefig(buffer, format="png")
+        self.savefig(buffer, format="png", dpi=NOTEBOOK_DPI)
         return buffer.getvalue()
 
 
