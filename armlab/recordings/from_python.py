@@ -5,7 +5,7 @@ import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from tempfile import mkdtemp
@@ -23,6 +23,7 @@ from armlab.recordings.imports.plan import ReadSources, plan_import
 from armlab.recordings.imports.sources import ReadOptions, Source, read_sources
 from armlab.recordings.motion import MotionRecording
 from armlab.recordings.recording import Finding, Recording
+from problem.robot_file import built_in_arms
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,15 +32,16 @@ Columns = str | Sequence[str]
 """Names of columns, or one text with commas between names and patterns, like `q*`."""
 
 
-class ImportOptions(TypedDict, total=False):
-    """Options of an import: columns by signal, and what the files do not tell.
+@dataclass(frozen=True)
+class Place:
+    """The folder of a recording. is_temporary: whether it goes with the Python process."""
 
-    units: by the signal, such as `{"position": "deg"}`. gains: N m per A or V, one a joint. gear_ratio: of signals of
-    the motors, turns of the motor in one turn of the joint; motor_side: which those are, both if left out. joints: of
-    the robot, in the order of the columns, for motion only. tip: the link where the arm ends. lock: positions, rad or
-    m, of joints that stand still. repair: whether links that no body can be become the nearest bodies. separator,
-    decimal: of a text file. topic, command_topic: of a bag.
-    """
+    folder: Path
+    is_temporary: bool
+
+
+class ImportOptions(TypedDict, total=False):
+    """Options of an import, see `import_recording`."""
 
     time: Columns
     position: Columns
@@ -77,10 +79,17 @@ def import_recording(
     """The recording in log files of any format that `armlab recording import` reads.
 
     robot: a built-in name or a robot file. validate: files that take no part in any fit. out: new folder for the
-    recording; a temporary one, which goes with the Python process, if left out. options: see `ImportOptions`; those of
-    `armlab recording import`, and needed only where the files do not tell. The findings of the recording say what each
-    signal was taken from, and what is doubtful. Raises InputError, in one line, for wrong options, and for all that are
-    missing together.
+    recording; a temporary one, which goes with the Python process, if left out. The findings of the recording say what
+    each signal was taken from, and what is doubtful. Raises InputError, in one line, for wrong options, and for all
+    that are missing together.
+
+    options, those of `armlab recording import`, are needed only where the files do not tell. Columns: time, position,
+    torque, velocity, temperature, voltage, link_position, reference_position, reference_velocity, simulated_torque,
+    simulated_position, each names or one text with commas and patterns. units: by signal, `{"position": "deg"}`. gains:
+    N m per A or V, one a joint. gear_ratio: of signals of the motors, turns of the motor in one turn of the joint;
+    motor_side: which those are, both if left out. joints: of the robot, in the order of the columns, for motion only.
+    tip: the link where the arm ends. lock: positions, rad or m, of joints that stand still. repair: whether links that
+    no body can be become the nearest bodies. separator, decimal: of a text file. topic, command_topic: of a bag.
 
         armlab.import_recording("log.csv", robot="arm.urdf", position="q*", torque="tau*", units={"torque": "N.m"})
     """
@@ -88,8 +97,7 @@ def import_recording(
     every = [*given, *(path for path in held_out if path not in given)]
     if not every:
         raise InputError("files is empty: give at least one log")
-    folder = Path(out) if out is not None else _temporary_folder(f"{every[0].stem}-recording")
-    return _import(every, robot, held_out, folder, options, read_sources)
+    return _import(every, robot, held_out, _place(out, f"{every[0].stem}-recording"), options, read_sources)
 
 
 def recording_of_frames(
@@ -109,8 +117,8 @@ def recording_of_frames(
         return {str(path): Source(found.table, dict.fromkeys(found.stamps, "s"), "DataFrame", stamps=found.stamps)}
 
     paths = [Path(name) for name in sources]
-    folder = Path(out) if out is not None else _temporary_folder("recording")
-    return _import(paths, robot, [Path(f"{name}.csv") for name in held_out], folder, options, read)
+    validating = [Path(f"{name}.csv") for name in held_out]
+    return _import(paths, robot, validating, _place(out, "recording"), options, read)
 
 
 def _split_frames(frame: Any, validate: Any) -> tuple[dict[str, "pd.DataFrame"], dict[str, "pd.DataFrame"]]:
@@ -178,32 +186,39 @@ def _import(
     files: Sequence[Path],
     robot: Any,
     validate: Sequence[Path],
-    folder: Path,
+    place: Place,
     options: ImportOptions,
     read: ReadSources,
 ) -> Recording | MotionRecording:
-    """The flow of the command's import. folder: to write."""
+    """The flow of the command's import."""
     if not isinstance(robot, str | Path | None):
         raise InputError(
             f"robot should be a built-in name or the path of a robot file, which a recording keeps, not "
             f"{type(robot).__name__}"
         )
+    changes = [name for name in ("tip", "lock", "repair") if options.get(name)]
+    if place.is_temporary and changes:
+        raise InputError(f"{changes[0]} makes a robot file of its own: give out, a new folder that keeps it")
     source = None if robot is None else str(robot)
-    given = {"robot": source, "validate": tuple(validate), "out": folder, **_as_texts(dict(options))}
+    given = {"robot": source, "validate": tuple(validate), "out": place.folder, **_as_texts(dict(options))}
     with _keywords_for_flags():
         imported = write_plan(plan_import(files, given, read))
-    doubts = [Finding("import_doubt", "warning", text) for text in imported.plan.doubts]
+    doubts = [Finding("import_doubt", "warning", _in_keywords(text)) for text in imported.plan.doubts]
     rows = [(name, text) for name, text in describe_plan(imported.plan) if name != "doubtful"]
     notes = [Finding("imported", "note", f"{name}: {_in_keywords(text)}") for name, text in rows]
     recording = read_recording(imported.folder)
+    if place.is_temporary and recording.robot not in built_in_arms():  # a model outlives the copy in the folder
+        recording = replace(recording, robot=str(Path(str(source)).resolve()))
     return replace(recording, findings=(*recording.findings, *doubts, *notes))
 
 
-def _temporary_folder(name: str) -> Path:
-    """A folder that is there until Python ends."""
-    place = Path(mkdtemp(prefix="armlab-"))
-    atexit.register(shutil.rmtree, place, ignore_errors=True)
-    return place / name
+def _place(out: str | Path | None, name: str) -> Place:
+    """The folder that is wanted, or one of that name that is there until Python ends."""
+    if out is not None:
+        return Place(Path(out), is_temporary=False)
+    above = Path(mkdtemp(prefix="armlab-"))
+    atexit.register(shutil.rmtree, above, ignore_errors=True)
+    return Place(above / name, is_temporary=True)
 
 
 _NO_TEXT: dict[str, Any] = {"units": (), "lock": (), "repair": False}

@@ -34,6 +34,7 @@ from problem.joint_words import joint_in_words
 if TYPE_CHECKING:  # loaded by those who draw, or ask for a table
     import pandas as pd
 
+    from armlab.common.report.charts import Chart
     from armlab.common.report.figures import ShownFigure
 
 FILE_NAME = "verdict.json"
@@ -90,13 +91,14 @@ class Verdict:
         )
 
     def plot(self, joint: int | None = None) -> "ShownFigure":
-        """A figure of the held-out error of each joint; of a joint (from 1): its torque, measured and predicted.
+        """A figure of the held-out error of each joint; of a joint (from 1): its torque, measured and predicted, or, of
+        motion only, its position, measured and replayed.
 
-        Raises InputError where nothing was fitted, and for the torque of a verdict that was read from a file.
+        Raises InputError where nothing was fitted, and for a joint of a verdict that was read from a file.
         """
         if not self.fit:
             raise InputError("nothing was fitted, so there is nothing to draw: `summary` says why")
-        return self._plot_errors() if joint is None else self._plot_torque(joint)
+        return self._plot_errors() if joint is None else self._plot_joint(joint)
 
     def _plot_errors(self) -> "ShownFigure":
         from armlab.common.report.charts import FLOOR_LOOK, FOUND_LOOK, GIVEN_LOOK, REFITTED_LOOK
@@ -113,18 +115,26 @@ class Verdict:
             "Error on held-out data", label, [self._joint_name(each.joint) for each in self.fit], series
         )
 
-    def _plot_torque(self, joint: int) -> "ShownFigure":
+    def _plot_joint(self, joint: int) -> "ShownFigure":
         from armlab.common.report.figures import plot_chart
+
+        charts = self._joint_charts()
+        if joint not in charts:
+            raise InputError(f"joint {joint}: give one of {', '.join(map(str, charts))}")
+        return plot_chart(charts[joint])
+
+    def _joint_charts(self) -> "dict[int, Chart]":
+        """By the number of the joint, from 1; InputError for a verdict without signals."""
+        from armlab.report.motion.report import position_charts
         from armlab.report.torque.residuals import select_residuals
         from armlab.report.torque.torque_pictures import torque_charts
 
-        data = select_residuals(self.diagnosis) if isinstance(self.diagnosis, Diagnosis) else None
-        if data is None:
-            raise InputError("only a live verdict of torque has signals: give plot() no joint, or diagnose again")
-        if not 1 <= joint <= len(self.fit):
-            raise InputError(f"joint {joint}: joints count from 1 to {len(self.fit)}")
-        assert isinstance(self.diagnosis, Diagnosis)
-        return plot_chart(torque_charts(self.diagnosis, data)[joint - 1])
+        if isinstance(self.diagnosis, MotionDiagnosis):
+            return position_charts(self.diagnosis)
+        data = None if self.diagnosis is None else select_residuals(self.diagnosis)
+        if data is None or self.diagnosis is None:
+            raise InputError("a verdict that was read has no signals: call plot() without a joint, or diagnose again")
+        return dict(enumerate(torque_charts(self.diagnosis, data), 1))
 
     def _joint_name(self, joint: int) -> str:
         return f"joint {joint}" if self.diagnosis is None else joint_in_words(self.diagnosis.simulation.arm, joint)

@@ -42,6 +42,7 @@ from armlab.report.motion.compare_write import comparison_page, make_motion_comp
 from armlab.report.motion.motion_page import joint_table, motion_page
 from armlab.report.motion.motion_verdict import make_motion_verdict, motion_texts
 from armlab.report.motion.motion_words import error_phrase, motion_lines
+from armlab.report.verdict import verdict_of
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 
@@ -73,6 +74,14 @@ def test_gain_friction_and_delay_are_named_with_their_numbers(diagnosis: MotionD
         assert numbers["coulomb_friction", joint] == pytest.approx(0.1, rel=0.15)
         assert numbers["command_delay", joint] == pytest.approx(0.02, abs=0.003)
     assert not {effect for effect, _ in numbers} & {"torque_saturation", "controller_dead_band", "rotor_inertia"}
+
+
+def test_a_live_verdict_draws_positions_measured_and_replayed(diagnosis: MotionDiagnosis) -> None:
+    verdict = verdict_of(make_motion_verdict(diagnosis), diagnosis, None)
+    (axes,) = verdict.plot(joint=2).axes
+    assert [line.get_label() for line in axes.lines] == ["measured", "simulation as given", "with what was found"]
+    assert verdict.model is None  # of torque
+    assert set(verdict.table["joint"]) == {1, 2}
 
 
 def test_a_finding_is_told_in_the_units_of_a_reader(diagnosis: MotionDiagnosis) -> None:

@@ -5,11 +5,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 from numpy.testing import assert_array_equal
 from refusals import refusal
 
 import armlab
 from armlab.recordings.recording import Recording
+from problem.robot_file import BUILT_IN_FOLDER
 
 UNITS = {"position": "rad", "torque": "N.m"}
 
@@ -77,7 +79,7 @@ def test_rows_and_names_say_which_runs_validate(frames):
         ({"position": "x*"}, "no column 'x*' for position"),
         ({"units": "rad"}, "units should be a dictionary like {'position': 'deg'}"),
         ({"gear_ratio": [100, 100]}, "gear_ratio= holds 2 numbers for 3 columns of position"),
-        ({"lock": {"joint3": 0.0}}, "tip= and lock= need a URDF or MJCF file"),
+        ({"lock": {"joint3": 0.0}}, "lock makes a robot file of its own: give out, a new folder that keeps it"),
         ({"position": ["q1", "q,2"]}, "the name 'q,2' holds a comma"),
         ({"validate": [1, 2]}, "validate should be a DataFrame"),
         ({"validate": np.arange(1200) % 2 == 0}, "cuts the frame into 1200 stretches, the shortest of 1 rows"),
@@ -106,6 +108,14 @@ def test_a_log_is_imported_and_written_where_a_folder_is_given(frames, tmp_path,
     assert_array_equal(armlab.read_recording("rec").runs[0].torque, written.runs[0].torque)
     assert "rec is there already" in refusal(armlab.import_recording, "log-1.csv", out="rec", **options)
     assert "should be paths of logs, not 42" in refusal(armlab.import_recording, 42, **options)
+
+
+def test_a_model_of_frames_names_the_robot_file_that_was_given(frames, tmp_path):
+    robot = tmp_path / "arm.yaml"
+    robot.write_text((BUILT_IN_FOLDER / "irb120-arm.yaml").read_text())
+    made = Recording.from_dataframe(frames[0], robot=robot, units=UNITS)
+    path = armlab.identify(made).save(tmp_path / "model.yaml")
+    assert yaml.safe_load(path.read_text())["robot"] == "arm.yaml"
 
 
 def test_a_log_without_torque_is_a_recording_of_motion_only(frames):

@@ -91,8 +91,8 @@ def test_both_draw_their_errors_and_a_live_one_its_torques(live, stored):
         "rigid body refitted",
         "with what was found",
     ]
-    assert "joint 2: joints count from 1 to 1" in refusal(live.plot, 2)
-    assert "only a live verdict" in refusal(stored.plot, 1)
+    assert "joint 2: give one of 1" in refusal(live.plot, 2)
+    assert "a verdict that was read has no signals" in refusal(stored.plot, 1)
     assert "nothing to draw" in refusal(replace(stored, fit=()).plot)
 
 

@@ -50,7 +50,7 @@ def _signature(name: str, value: Any) -> str:
         text = str(inspect.signature(value))
     except ValueError:
         return f"{name}(...)"
-    text = text.replace(str(Array), "Array")
+    text = re.sub(r"(\*\*\w+): [^,)]*", r"\1", text.replace(str(Array), "Array"))
     text = re.sub(r"\b(?:[a-z_]\w*\.)+(?=[A-Za-z])", "", text)
     text = re.sub(r"<[^<>]*(?:<lambda>)?[^<>]*>", "...", text)  # a default that has no notation
     return f"{name}{text.replace('(self, ', '(').replace('(self)', '()')}"

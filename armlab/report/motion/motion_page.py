@@ -1,9 +1,8 @@
 """The page of a motion-only verdict: findings, errors before and after, one figure a joint, what the files hold."""
 
 import numpy as np
-from markupsafe import Markup
 
-from armlab.common.report.charts import FOUND_LOOK, GIVEN_LOOK, MEASURED_LOOK, Layer, Line, draw_chart, fit_axis
+from armlab.common.report.charts import FOUND_LOOK, GIVEN_LOOK, MEASURED_LOOK, Chart, Layer, Line, draw_chart, fit_axis
 from armlab.common.report.page import Table, render_page
 from armlab.common.report.wording import format_unit
 from armlab.diagnosis.motion.export import lines_without_field
@@ -29,7 +28,8 @@ def motion_page(diagnosis: MotionDiagnosis, command: str) -> str:
     known = diagnosis.servos is not None
     first, _, rest = summary_of(diagnosis).partition(". ")
     rest = " ".join([rest, *remarks(diagnosis)]).strip()
-    pictures = _pictures(diagnosis) if known else []
+    charts = position_charts(diagnosis).values() if known else ()
+    pictures = [draw_chart(each.title, each.x, each.y, each.layers) for each in charts]
     shown = _most_telling_row(diagnosis) if known else 0
     return render_page(
         __package__,
@@ -101,9 +101,9 @@ def _most_telling_row(diagnosis: MotionDiagnosis) -> int:
     return int(np.argmax(falls)) if falls else 0
 
 
-def _pictures(diagnosis: MotionDiagnosis) -> list[Markup]:
-    """One figure a joint: a stretch of a held-out run in which it moves most."""
-    made = []
+def position_charts(diagnosis: MotionDiagnosis) -> dict[int, Chart]:
+    """By the number of the joint, from 1: its position, measured and replayed, where it moves most in held-out runs."""
+    made = {}
     for row in range(len(diagnosis.simulation.joints)):
         after = max(diagnosis.replayed_after, key=lambda each: float(np.ptp(each.run.position[:, row])))
         run = after.run
@@ -117,8 +117,8 @@ def _pictures(diagnosis: MotionDiagnosis) -> list[Markup]:
         layers.append(Line(time, after.position[chosen, row], FOUND_LOOK))
         shown = [layer.y for layer in layers if isinstance(layer, Line)]
         x, y = fit_axis("time, s", time), fit_axis("position, rad", *shown)
-        joint = joint_at_start(diagnosis.simulation.arm, diagnosis.simulation.number_of(row))
-        made.append(draw_chart(f"{joint}: {run.name}", x, y, layers))
+        number = diagnosis.simulation.number_of(row)
+        made[number] = Chart(f"{joint_at_start(diagnosis.simulation.arm, number)}: {run.name}", x, y, layers)
     return made
 
 
