@@ -5,10 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.documents import Document
 from armlab.common.errors import InputError
+from armlab.recordings.clock import MAX_BRIDGED_GAP
 from armlab.recordings.identifiable import has_no_torque, reason_not_identifiable, reason_still
 from armlab.recordings.load import load_runs, open_recording, with_runs
 from armlab.recordings.motion import (
@@ -62,6 +64,7 @@ def signs_of_wrong_reading(recording: Recording) -> tuple[Finding, ...]:
         "rate",
         "beyond_limits",
         "velocity_mismatch",
+        "lost_rows",
         "standstill",
         "encoder_period",
         "unsigned_current",
@@ -136,7 +139,7 @@ def _check_velocity(run: MotionRun, arm: Arm, joint: int) -> list[Finding]:
     velocity = block_means(run.velocity[:, joint : joint + 1])[:, 0]
     likeness = np.array([correlation(velocity, slope) for slope in slopes.T])
     if likeness[joint] >= MIN_SLOPE_CORRELATION:
-        return _check_velocity_scale(velocity, slopes[:, joint], arm, joint)
+        return _check_velocity_scale(run, velocity, slopes[:, joint], arm, joint)
     if np.ptp(slopes[:, joint]) == 0:
         return []
     best, own = int(np.argmax(np.abs(likeness))), joint_in_words(arm, joint + 1)
@@ -149,13 +152,37 @@ def _check_velocity(run: MotionRun, arm: Arm, joint: int) -> list[Finding]:
     return _joint_warning("velocity_mismatch", joint, text)
 
 
-def _check_velocity_scale(velocity: Array, slope: Array, arm: Arm, joint: int) -> list[Finding]:
+def _check_velocity_scale(run: MotionRun, velocity: Array, slope: Array, arm: Arm, joint: int) -> list[Finding]:
     scale = float(velocity @ slope / (slope @ slope))
-    if 0.9 < scale < 1.1:
+    if _is_near_one(scale):
         return []
     own = joint_in_words(arm, joint + 1)
-    text = f"velocity of {own} is {scale:.4g} times its position's slope: another unit or gear?"
-    return _joint_warning("velocity_mismatch", joint, text)
+    jumps = _places_of_lost_rows(run, joint)
+    text = f"velocity of {own} is {scale:.4g} times its position's slope"
+    if len(jumps) > 1:
+        period = float(np.median(np.diff(run.time[jumps])))
+        text += (
+            f", and fits it between jumps of the position, one every {period:.3g} s: rows are missing there while the "
+            "stamps go on, so the clock of the file is too fast"
+        )
+        return _joint_warning("lost_rows", joint, text)
+    return _joint_warning("velocity_mismatch", joint, f"{text}: another unit or gear?")
+
+
+def _is_near_one(scale: float) -> bool:
+    return 0.9 < scale < 1.1
+
+
+def _places_of_lost_rows(run: MotionRun, joint: int) -> NDArray[np.intp]:
+    """Rows after which the position moves by more than a bridged gap of its velocity, which fits it elsewhere."""
+    assert run.velocity is not None
+    velocity = (run.velocity[1:, joint] + run.velocity[:-1, joint]) / 2
+    told, moved = velocity * np.diff(run.time), np.diff(run.position[:, joint])
+    fast = np.abs(velocity) >= np.sqrt(np.mean(velocity**2))
+    jumps = fast & (np.abs(moved) > MAX_BRIDGED_GAP * np.abs(told))
+    rest = moved[fast & ~jumps]
+    scale = float(told[fast & ~jumps] @ rest / (rest @ rest)) if rest.any() else 0.0
+    return np.flatnonzero(jumps) if _is_near_one(scale) else np.array([], dtype=np.intp)
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,7 @@ from problem.joint_words import joints_in_words
 
 MIN_DURATION_S = 2.0  # of all runs that identify: too short to tell physics from chance (chosen by eye)
 MIN_TRAVEL = 1e-3  # rad or m: a joint that travels less does not move (chosen by eye)
+MAX_MULTIPLE_DIFFERENCE = 1e-6  # of the range of a torque: what digits of a file leave between it and its multiple
 MAX_COPIED_SHARE = 0.5  # of the rows of a run that validates, found in a run that identifies
 
 
@@ -34,7 +35,8 @@ def require_identifiable(*recordings: Recording) -> None:
     """
     for recording in recordings:
         runs = recording.runs_to_identify()
-        _refuse(recording, reason_short(runs) or reason_still(runs) or reason_copied(recording))
+        judge = reason_dead_to_judge(recording) or reason_copied(recording)
+        _refuse(recording, reason_short(runs) or reason_still(runs) or judge)
     runs = tuple(run for recording in recordings for run in recording.runs_to_identify())
     reason = reason_dead(runs, recordings[0].arm)
     if reason is not None:
@@ -49,7 +51,7 @@ def require_possible(*recordings: Recording) -> None:
 
 def require_torque(recording: Recording) -> None:
     """Raises InputError, in one line, for runs with which no torque can be compared; they may be short and stand."""
-    _refuse(recording, reason_dead(recording.runs, recording.arm))
+    _refuse(recording, reason_dead(recording.runs, recording.arm) or reason_dead_to_judge(recording))
     require_possible(recording)
 
 
@@ -61,7 +63,8 @@ def _refuse(recording: Recording, reason: str | None) -> None:
 def reason_not_identifiable(recording: Recording) -> str | None:
     """The reason in a sentence; None for a recording that can be used. InputError where no run identifies."""
     runs = recording.runs_to_identify()
-    return reason_short(runs) or reason_still(runs) or reason_dead(runs, recording.arm) or reason_copied(recording)
+    of_runs = reason_short(runs) or reason_still(runs) or reason_dead(runs, recording.arm)
+    return of_runs or reason_dead_to_judge(recording) or reason_copied(recording)
 
 
 def reason_short(runs: Sequence[Run]) -> str | None:
@@ -97,17 +100,33 @@ def reason_dead(runs: Sequence[Run], arm: Arm) -> str | None:
         said = "is zero throughout" if zero else "never changes"
         words = joints_in_words(arm, [joint + 1 for joint in dead])
         return f"The torque of {words} {said}: is the right column named?"
-    for name in ("torque", "position"):
-        signals = [run.signals[name] for run in runs]
-        for first, second in combinations(range(len(arm)), 2):
-            if all(_is_copy(each[:, first], each[:, second]) for each in signals):
-                words = joints_in_words(arm, [first + 1, second + 1])
+    for first, second in combinations(range(len(arm)), 2):
+        words = joints_in_words(arm, [first + 1, second + 1])
+        for name in ("torque", "position"):
+            if all(_is_copy(run.signals[name][:, first], run.signals[name][:, second]) for run in runs):
                 return f"The {name} of {words} is the same in every row: one column is a copy of the other."
+        factor = _factor_of_multiple([run.torque[:, [first, second]] for run in runs])
+        if factor is not None:
+            return (
+                f"The torque of {words} differs by the factor {factor:.4g} in every row: one column is a multiple of "
+                "the other."
+            )
     return None
 
 
 def _is_copy(first: Array, second: Array) -> bool:
     return bool(np.ptp(first) > 0 and np.array_equal(first, second))
+
+
+def _factor_of_multiple(pairs: Sequence[Array]) -> float | None:
+    """The factor between two torques where one is a multiple of the other in all rows, (rows, 2) each; else None."""
+    first, second = np.concatenate(pairs).T
+    range_of_second = float(np.ptp(second))
+    if not np.ptp(first) > 0 or not range_of_second > 0:
+        return None
+    factor = float(first @ second / (first @ first))
+    is_multiple = np.max(np.abs(second - factor * first)) <= MAX_MULTIPLE_DIFFERENCE * range_of_second
+    return factor if is_multiple else None
 
 
 def reason_impossible(runs: Sequence[Run], arm: Arm) -> str | None:
@@ -123,6 +142,21 @@ def reason_impossible(runs: Sequence[Run], arm: Arm) -> str | None:
             torque = float(np.quantile(np.abs(run.torque[:, place]), 1 - OUTLIER_SHARE))
             if not can_have_torque(joint, torque, 0.0, None):
                 return f"The torque of {words} reaches {torque:.4g}, more than any drive has. Which unit is it in?"
+    return None
+
+
+def reason_dead_to_judge(recording: Recording) -> str | None:
+    """A run that validates and lacks a torque of a joint that moves, which other runs have."""
+    for judge in recording.with_role("validate"):
+        moves = np.ptp(judge.position, axis=0) > MIN_TRAVEL
+        known = np.any([np.ptp(run.torque, axis=0) > 0 for run in recording.runs], axis=0)
+        dead = np.flatnonzero(moves & known & (np.ptp(judge.torque, axis=0) == 0))
+        if len(dead):
+            words = joints_in_words(recording.arm, [int(joint) + 1 for joint in dead])
+            return (
+                f"The torque of {words} never changes in {judge.name}, which validates, though it moves there: its "
+                "error says nothing. Give another run, or none."
+            )
     return None
 
 

@@ -44,6 +44,11 @@ def copied() -> pd.DataFrame:
     return table.assign(tau3=table["tau2"])
 
 
+def multiple() -> pd.DataFrame:
+    table = frame()
+    return table.assign(tau3=(-0.4 * table["tau2"]).round(8))
+
+
 def still() -> pd.DataFrame:
     table = frame()
     return table.assign(**{name: table[name].iloc[0] for name in POSITION})
@@ -70,6 +75,7 @@ CASES = {
     one_silent: "The torque of joint 2 is zero throughout: is the right column named?",
     constant: "never changes: is the right column named?",
     copied: "The torque of joints 2 and 3 is the same in every row",
+    multiple: "The torque of joints 2 and 3 differs by the factor -0.4 in every row",
     still: "No joint moves",
     short: "The runs hold 0.29 s in all: too short to tell physics from chance; record 10 s or more.",
 }
@@ -137,6 +143,18 @@ def test_a_copy_of_a_run_does_not_validate_it(tmp_path: Path, rows: slice) -> No
     frame().iloc[rows].to_csv(folder / "check.csv", index=False)
     said = refusal(run_through, identify_recording(folder, tmp_path / "out", AS_READ))
     assert "check.csv validates and holds rows of run.csv" in said
+
+
+def test_a_torque_that_is_dead_in_the_run_that_validates_alone_judges_nothing(tmp_path: Path) -> None:
+    model = identified(tmp_path)
+    folder = folder_with(tmp_path / "bad", frame())
+    frame(1).assign(tau2=0.0).to_csv(folder / "check.csv", index=False)
+    acts = (
+        lambda: run_through(identify_recording(folder, tmp_path / "out", AS_READ)),
+        lambda: run_through(predict_recording(model, folder, None)),
+    )
+    for act in acts:
+        assert "joint 2 never changes in check.csv, which validates" in refusal(act)
 
 
 def test_fewer_independent_rows_than_unknowns_are_refused_with_both_numbers(tmp_path: Path) -> None:

@@ -9,7 +9,9 @@ from numpy.testing import assert_allclose
 from recording_folders import POSITION, TORQUE, folder_with, frame
 from refusals import refusal
 
-from armlab.recordings.imports.files import import_files, list_columns
+from armlab.recordings.imports.families import list_columns
+from armlab.recordings.imports.files import import_files
+from armlab.recordings.imports.plan import plan_import
 from armlab.recordings.imports.text import read_odd_csv
 from armlab.recordings.load import load_recording
 
@@ -90,6 +92,49 @@ def test_columns_that_count_up_are_listed_by_the_first_and_the_last() -> None:
     assert list_columns(["q1", "q2", "q4", "q5"]) == "q1, q2, q4, q5"
     assert list_columns(["elbow", "wrist_1", "wrist_2", "wrist_3"]) == "elbow, wrist_1, wrist_2, wrist_3"
     assert list_columns(["q1", "q2", "q3"]) == "q1, q2, q3"
+
+
+def write_torques(path: Path, **others: float) -> Path:
+    """The run with a velocity, a counter, and further torques that are so many times the measured one."""
+    table = frame()
+    factors = {f"{name}{n}": factor * table[f"tau{n}"] for name, factor in others.items() for n in (1, 2, 3)}
+    speeds = {f"qd{n}": 0.1 * n * table["t"] for n in (1, 2, 3)}
+    table.assign(**speeds, **factors, rows=np.arange(len(table))).to_csv(path, index=False)
+    return path
+
+
+ALL_UNITS = ("position=rad", "torque=N.m")
+
+
+def test_columns_that_no_signal_takes_are_listed_with_the_option_for_a_velocity(tmp_path: Path) -> None:
+    log = write_torques(tmp_path / "log.csv", tauCmd=0.9)
+    imported = import_files([log], tmp_path / "new", {**NOTHING, "units": ALL_UNITS})
+    (line,) = (line for line in imported.lines if line.startswith("not used: "))
+    assert line == (
+        "not used: qd1, qd2, qd3, tauCmd1, tauCmd2, tauCmd3, rows; --velocity 'qd*' compares a velocity with positions"
+    )
+    assert imported.document["unused_columns"][-1] == "rows"
+
+
+@pytest.mark.parametrize(("others", "count"), [({"tauSm": 1.2}, 2), ({"tauCur": 2.0, "tauSm": 1.2, "tauDes": 1.0}, 3)])
+def test_several_torques_are_a_question_and_those_of_a_controller_are_none(
+    tmp_path: Path, others: dict[str, float], count: int
+) -> None:
+    options = {**NOTHING, "units": ALL_UNITS, "out": tmp_path / "new"}
+    (question,) = plan_import([write_torques(tmp_path / "log.csv", **others)], options).questions
+    assert f"the file holds {count} torques of each joint (tau1, tau2, tau3; " in question.missing
+    best = "tauCur" if "tauCur" in others else "tau"
+    assert question.proposal == f"{best}1,{best}2,{best}3"
+    assert not plan_import([tmp_path / "log.csv"], question.with_answer(options, "tauSm*")).questions
+
+
+def test_torques_that_never_change_or_that_a_driver_names_are_not_asked_about(tmp_path: Path) -> None:
+    options = {**NOTHING, "units": ALL_UNITS, "out": tmp_path / "new"}
+    assert not plan_import([write_torques(tmp_path / "zero.csv", tauSm=0.0)], options).questions
+    franka = ("t", *bracketed("q"), *bracketed("tau_J"))
+    log = pd.read_csv(write_log(tmp_path / "log.csv", franka))
+    log.assign(**dict.fromkeys(bracketed("tau_other"), log["tau_J[0]"])).to_csv(tmp_path / "log.csv")
+    assert not plan_import([tmp_path / "log.csv"], options).questions
 
 
 @pytest.mark.parametrize(

@@ -294,6 +294,18 @@ def test_torque_far_too_small_is_doubtful_where_some_joints_have_none(tmp_path: 
     assert "against gravity" in doubt
 
 
+def test_a_joint_that_gravity_does_not_load_is_not_doubted(tmp_path: Path) -> None:
+    urdf = (
+        '<robot name="turntable"><link name="base"/><link name="plate"><inertial><origin xyz="1e-7 0 0"/>'
+        '<mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        '<joint name="turn" type="revolute"><parent link="base"/><child link="plate"/>'
+        '<axis xyz="1e-6 0 1"/><limit lower="-10" upper="10" effort="150" velocity="20"/></joint></robot>'
+    )
+    (tmp_path / "table.urdf").write_text(urdf)
+    log = carrying_table()[["t", "q1", "tau1"]]
+    assert plan_of(tmp_path, log, str(tmp_path / "table.urdf"), OPTIONS["units"]).doubts == ()
+
+
 def test_torque_is_judged_by_the_limits_where_the_links_are_unknown(tmp_path: Path) -> None:
     robot = changed_arm(tmp_path, {"torque_limit": 60.0})
     text = yaml.safe_load(Path(robot).read_text())

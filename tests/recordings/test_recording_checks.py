@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from recording_folders import ARM, POSITION, SETTINGS, TORQUE, folder_with, frame
+from recording_folders import ARM, POSITION, RATE_HZ, SETTINGS, TORQUE, folder_with, frame
 
 from armlab.recordings.check import check_channels, check_recording
 from armlab.recordings.load import load_recording
@@ -61,6 +61,15 @@ def test_a_joint_that_is_faster_than_it_can_be_is_named() -> None:
     table = frame()
     table["t"] /= 100
     assert {kind for kind, _ in said(run_of(table))} == {"beyond_limits"}
+
+
+def test_rows_that_are_missing_behind_even_stamps_are_the_cause_of_a_velocity_that_is_too_small() -> None:
+    table = with_velocity()
+    kept = table[np.arange(len(table)) % 30 < 20].reset_index(drop=True)
+    kept["t"] = np.arange(len(kept)) / RATE_HZ
+    texts = [finding.text for finding in check_channels(run_of(kept), ARM) if finding.kind == "lost_rows"]
+    assert len(texts) == 3
+    assert all("one every 0.1 s: rows are missing there" in text for text in texts)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from fnmatch import fnmatchcase
 
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
+from armlab.recordings.imports.families import MEASURED_WORDS, Family, rival_torques
 from armlab.recordings.imports.proposals import match_joints, propose_columns, propose_time
 from armlab.recordings.imports.questions import NO_TORQUE, Options, Question
 from armlab.recordings.imports.recognition import (
@@ -113,7 +114,10 @@ def choose_columns(
             except JointNamesError as error:
                 questions.append(_ask_columns(log, signal, columns, str(error)))
                 continue
-            if found is not None:
+            rivals = rival_torques(log.source.table, found.value, log.joints) if found and signal == "torque" else ()
+            if rivals:
+                questions.append(_ask_torque(rivals, log.joints))
+            elif found is not None:
                 columns[signal] = found
             else:
                 questions.append(_ask_columns(log, signal, columns, None))
@@ -136,15 +140,29 @@ def _ask_columns(log: Log, signal: str, columns: Mapping[str, Known], reason: st
     other = ", or --reference-position of a position servo" if signal == "torque" else ""
     flag = signal.replace("_", "-")
     count = f" with {len(log.joints)} columns, one a joint of the robot" if log.joints and signal != "time" else ""
-    missing = reason or f"the columns of {signal} are missing: give --{flag}{count}{other}; the file holds {shown}"
+    chosen = {name: known.value for name, known in columns.items()}
+    proposal = "" if signal == "time" else ",".join(propose_columns(names, signal, log.joints, chosen))
+    perhaps = f" (perhaps {proposal})" if proposal else ""
+    missing = reason or f"the columns of {signal} are missing: give --{flag}{count}{perhaps}{other}"
+    holds = None if reason else f"the file holds {shown}"
     text = _column_text(signal, log.joints)
     if signal == "torque":
         text += f", or '{NO_TORQUE}' for a log of commands and positions"
     if signal == "time":
-        return Question(signal, missing, text, propose_time(table.names, table.values))
-    chosen = {name: known.value for name, known in columns.items()}
-    proposal = ",".join(propose_columns(names, signal, log.joints, chosen))
-    return Question(signal, missing, text, proposal or None)
+        proposal = propose_time(table.names, table.values) or ""
+    return Question(signal, missing, text, proposal or None, context=holds)
+
+
+def _ask_torque(rivals: Sequence[Family], joints: Sequence[str]) -> Question:
+    """Which of several torques is to be compared with the model."""
+    best = next((each for each in rivals if each.words & MEASURED_WORDS), rivals[0])
+    missing = (
+        f"the file holds {len(rivals)} torques of each joint ({'; '.join(each.text for each in rivals)}): give "
+        "--torque with the one that a sensor or the motor current measures, which holds the friction; one that a model "
+        "computed, or a controller wanted, holds none"
+    )
+    names = order_by_joint(best.names, joints, "torque")
+    return Question("torque", missing, f"{_column_text('torque', joints)}, measured", ",".join(names))
 
 
 def _expand_names(given: str, table: Table, signal: str, joints: Sequence[str], some_joints: bool) -> tuple[str, ...]:

@@ -25,6 +25,7 @@ GRAVITY_RATIOS = (0.05, 100.0)  # of the largest torque to the largest that grav
 CARRYING_SHARE = 0.1  # of the largest gravity torque: a joint with less carries little
 MIN_RATIO = 1e-12  # a joint whose torque is zero counts as one with so little
 FITTING_RATIOS = (0.2, 20.0)  # of the same ratio in a unit that fits
+MIN_LEVER_M = 1e-3  # of all links' weight at a turning joint: less is rounding of the file, and loads nothing
 POSES = 300  # at which gravity is computed
 
 
@@ -134,7 +135,10 @@ def _torque_advice(names: Sequence[str], ratio: float, is_geared: bool) -> str:
 
 
 def _gravity_peaks(numbers: Sequence[Numbers], arm: Arm | None, units: Units) -> Array | None:
-    """The largest torque that gravity needs at each joint in the recorded poses, (joints,); None where unknown."""
+    """The largest torque that gravity needs at each joint in the recorded poses, (joints,).
+
+    None where links are unknown, and where gravity loads no joint.
+    """
     if arm is None or arm.links is None or len(arm) != len(numbers[0].joints):
         return None
     known = SIGNAL_QUANTITIES["position"].units
@@ -146,7 +150,8 @@ def _gravity_peaks(numbers: Sequence[Numbers], arm: Arm | None, units: Units) ->
         torque = rigid_body_torque(arm, Motion(position, np.zeros_like(position), np.zeros_like(position)))
         peaks.append(np.quantile(np.abs(torque), 1 - OUTLIER_SHARE, axis=0))
     needed = np.max(peaks, axis=0)
-    return needed if np.all(np.isfinite(needed)) and np.max(needed) > 0 else None
+    weight = float(np.linalg.norm(arm.gravity)) * sum(link.mass for link in arm.links)
+    return needed if np.all(np.isfinite(needed)) and np.max(needed) > MIN_LEVER_M * weight else None
 
 
 def _gravity_anywhere(arm: Arm) -> Array:

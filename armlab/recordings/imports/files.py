@@ -1,7 +1,6 @@
 """From files of other formats to a recording folder: the last step of an import, and what it says about itself."""
 
 import os
-import re
 import shutil
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -10,6 +9,7 @@ from pathlib import Path
 from armlab.common.documents import Document
 from armlab.common.errors import InputError
 from armlab.recordings.identifiable import has_no_torque, reason_dead, reason_not_identifiable
+from armlab.recordings.imports.families import describe_unused, list_columns
 from armlab.recordings.imports.gears import Gear
 from armlab.recordings.imports.packed import PACKED_SUFFIXES
 from armlab.recordings.imports.plan import ImportPlan, plan_import
@@ -24,7 +24,6 @@ from armlab.recordings.recording_file import Draft, DraftRun, Keys, write_record
 from armlab.recordings.table import has_parquet
 
 MAX_CSV_NUMBERS = 5_000_000  # of a run; a larger one is written as Parquet, a hundredth of the time and half the size
-MAX_LISTED_COLUMNS = 3  # of a signal; of more, numbered in a row, the first and the last are named
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +56,8 @@ def write_plan(plan: ImportPlan) -> ImportedRecording:
     Raises InputError, with all of them, where questions are open, and where no command could use what was recorded.
     """
     if plan.questions or plan.robot is None:
-        raise InputError("; ".join(question.missing for question in plan.questions))
+        contexts = dict.fromkeys(question.context for question in plan.questions if question.context)
+        raise InputError("; ".join((*(question.missing for question in plan.questions), *contexts)))
     draft = _draft_of(plan, plan.robot)
     folder = Path(plan.options["out"])
     was_there = folder.is_dir()
@@ -129,6 +129,7 @@ def _describe_runs(plan: ImportPlan, draft: Draft) -> Document:
         ],
         "columns": plan.columns,
         "units": plan.units,
+        "unused_columns": plan.unused,
         "reasons": {"columns": plan.column_reasons, "units": plan.unit_reasons},
     }
 
@@ -182,6 +183,8 @@ def describe_plan(plan: ImportPlan) -> list[tuple[str, str]]:
         rows.append(("gear ratio", _describe_gear(plan.gear, "torque" in plan.columns)))
     if plan.joints:
         rows.append(("joints", f"{', '.join(plan.joints)}; the others of the robot are held at zero"))
+    if plan.unused:
+        rows.append(("not used", describe_unused(plan.unused, plan.joint_names)))
     return [*rows, *(("doubtful", text) for text in plan.doubts)]
 
 
@@ -190,18 +193,6 @@ def _describe_signal(plan: ImportPlan, signal: str, names: Sequence[str]) -> str
     column, unit = plan.column_reasons[signal], plan.unit_reasons.get(signal)
     why = column if unit is None or unit in column else f"{column}; unit {unit}"
     return f"{list_columns(names)} [{_describe_unit(plan, signal)}] ({why})"
-
-
-def list_columns(names: Sequence[str]) -> str:
-    """All names, or the first and the last of names that differ in a number that counts up alone."""
-    parts = [re.fullmatch(r"(.*?)(\d+)(\D*)", name) for name in names]
-    found = [part.groups() for part in parts if part]
-    if len(names) > MAX_LISTED_COLUMNS and len(found) == len(names):
-        counts = [int(number) for _, number, _ in found]
-        is_alike = len({(stem, end) for stem, _, end in found}) == 1
-        if is_alike and counts == list(range(counts[0], counts[0] + len(counts))):
-            return f"{names[0]} ... {names[-1]}"
-    return ", ".join(names)
 
 
 def _describe_gear(gear: Gear, has_torque: bool) -> str:

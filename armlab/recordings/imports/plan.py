@@ -38,7 +38,7 @@ class ImportPlan:
     signal. units: of each signal, one for all its columns or one a column. column_reasons, unit_reasons: why these, by
     the signal. gains: of the torque, where it is in A or V. gear: of signals that were measured at the motors. joints:
     of the robot, in the order of the columns, where the recording has only some of them. doubts: what is probably, but
-    not surely, read in a wrong unit.
+    not surely, read in a wrong unit. unused: columns of the first file that hold numbers and are no signal.
     """
 
     options: Options
@@ -52,7 +52,14 @@ class ImportPlan:
     gear: Gear | None = None
     joints: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
+    unused: tuple[str, ...] = ()
     questions: tuple[Question, ...] = ()
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints that the columns belong to; empty while the robot is open."""
+        arm = self.robot.arm if self.robot else None
+        return self.joints or (tuple(joint.name for joint in arm.joints) if arm else ())
 
 
 def plan_import(files: Sequence[Path], options: Options, read: ReadSources = read_sources) -> ImportPlan:
@@ -78,6 +85,7 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
     log, commands, unmatched = choose_commands(log)
     chosen_columns, unnamed = choose_columns(log, commands, unmatched)
     columns = {signal: known.value for signal, known in chosen_columns.items()}
+    taken = {name for names in columns.values() for name in names} | {JOINED}
     if len(columns.get("time", ())) == 2:
         sources = {path: _join_time(source, columns["time"]) for path, source in sources.items()}
         log, columns = replace(log, source=next(iter(sources.values()))), {**columns, "time": (JOINED,)}
@@ -111,6 +119,7 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
         gear=gear,
         doubts=(*doubts, *(robot.impossible if robot else ())),
         joints=log.joints if arm and (log.joints != whole or chosen) else (),
+        unused=tuple(name for name in log.source.table.filled if name not in taken),
         questions=(*robots, *unmatched, *unnamed, *unmeasured, *unscaled, *impossible, *_ask_out(files, options)),
     )
 

@@ -8,13 +8,14 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError, UndecidedError
+from armlab.recordings.imports.families import choose_measured
 from armlab.recordings.imports.recognition import split_name, time_unit
 from armlab.recordings.units import SIGNAL_QUANTITIES
 from problem.robot_file import load_arm
 
 COLUMN_NAME_PATTERNS = {
     "position": r"(q|pos|position|angle|theta|act_pos|qm)[._ ]?.*",
-    "torque": r"(tau|torque|trq|effort|moment|gamma|current)[._ ]?.*",
+    "torque": r"(tau|tor|torque|trq|effort|moment|gamma|current)[._ ]?.*",
     "reference_position": r"(c|cmd|command|goal|target|target_q|ref|reference|desired|set_?point|q_d)[._ ]?.*",
 }
 ROBOT_SUFFIXES = (".urdf", ".xml", ".yaml", ".yml")
@@ -68,10 +69,12 @@ def propose_columns(
     taken = {name for columns in chosen.values() for name in columns}
     free = [name for name in names if name not in taken]
     found = [name for name in free if pattern and re.fullmatch(pattern, name.split(".")[-1], re.IGNORECASE)]
+    if signal != "reference_position":
+        found = list(choose_measured(found, len(joints)))
     matched = match_joints(found, joints) or follow_order(found, chosen.get("position", ()))
     if matched:
         return matched
-    numbered = all(re.search(r"\d", name) for name in found)
+    numbered = len(joints) == 1 or all(re.search(r"\d", name) for name in found)
     return tuple(found) if numbered and len(found) == (len(joints) or len(found)) else ()
 
 

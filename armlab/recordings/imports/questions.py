@@ -13,7 +13,8 @@ class Question:
     """What neither the files nor the options tell.
 
     option: of the command, by name. missing: the sentence of a message, with the flag. text: what a form asks.
-    proposal: the answer to offer, or None. signal: whose unit is asked for, where the option is `units`.
+    proposal: the answer to offer, or None. signal: whose unit is asked for, where the option is `units`. context: what
+    a message says once after all that is missing.
     """
 
     option: str
@@ -21,6 +22,7 @@ class Question:
     text: str
     proposal: str | None = None
     signal: str | None = None
+    context: str | None = None
 
     def with_answer(self, options: Options, answer: str) -> dict[str, Any]:
         """The options with an answer in its place."""

@@ -140,7 +140,7 @@ def recognise_signal(names: Sequence[str], signal: str, joints: Sequence[str]) -
         reason = f"named as in {meaning.writer}" if meaning.writer else "usual names"
         if not joints:
             return Known(group, reason)
-        own = tuple(name for name, owner in zip(group, _owners(group, joints), strict=True) if owner)
+        own = tuple(name for name, owner in zip(group, owners_of(group, joints), strict=True) if owner)
         if len(own) == len(joints) or len(group) == len(joints):
             chosen = order_by_joint(own if len(own) == len(joints) else group, joints, signal)
             return Known(chosen, reason + (", joints matched by name" if set(chosen) == set(own) else ""))
@@ -197,7 +197,7 @@ def order_by_joint(names: tuple[str, ...], joints: Sequence[str], signal: str) -
     """
     if len(names) == 1:
         return names
-    owners = _owners(names, joints)
+    owners = owners_of(names, joints)
     if sorted(owners) == sorted(joints):
         return tuple(names[owners.index(joint)] for joint in joints)
     numbers = [re.search(r"(\d+)\D*$", name) for name in names]
@@ -212,7 +212,7 @@ def order_by_joint(names: tuple[str, ...], joints: Sequence[str], signal: str) -
 
 def check_joint_order(names: tuple[str, ...], joints: Sequence[str], signal: str) -> None:
     """Raises InputError where listed columns carry the names of the robot's joints in another order."""
-    owners = _owners(names, joints)
+    owners = owners_of(names, joints)
     if sorted(owners) == sorted(joints) and owners != list(joints):
         raise InputError(
             f"--{signal.replace('_', '-')} lists the joints {', '.join(owners)}; the robot's order is "
@@ -220,7 +220,7 @@ def check_joint_order(names: tuple[str, ...], joints: Sequence[str], signal: str
         )
 
 
-def _owners(names: tuple[str, ...], joints: Sequence[str]) -> list[str]:
+def owners_of(names: Sequence[str], joints: Sequence[str]) -> list[str]:
     """The joint that each column's name carries, the longest of several; empty where it carries none."""
     return [max((joint for joint in joints if _carries(name, joint)), key=len, default="") for name in names]
 
