@@ -123,6 +123,9 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
     "[default: both]",
 )
 @click.option("--joints", metavar="NAMES", help="Motion only: joints of the robot in the order of the columns.")
+@click.option(
+    "--controller", metavar="KEY=VALUES ...", help="Motion only: the drive, as 'kp=25 kd=5 delay=0.1', SI units."
+)
 @click.option("--validate", multiple=True, type=click.Path(path_type=Path), help="File with role validate.")
 @click.option("--separator", help="Separator of a text file: a character or a word (tab, blank).")
 @click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a text file.")

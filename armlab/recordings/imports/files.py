@@ -105,6 +105,7 @@ def _draft_of(plan: ImportPlan, robot: ImportedRobot) -> Draft:
         **({"gains": list(plan.gains)} if plan.gains else {}),
         **({"transmission": plan.gear.transmission("torque" in columns)} if plan.gear else {}),
         **({"joints": list(plan.joints)} if plan.joints else {}),
+        **({"controller": plan.controller} if plan.controller else {}),
     }
     note = tuple(f"{run.file}: imported from {Path(path).name}" for path, run in zip(plan.sources, runs, strict=True))
     return Draft(robot.name, columns, dict(plan.units), tuple(runs), others, note)
@@ -183,6 +184,8 @@ def describe_plan(plan: ImportPlan) -> list[tuple[str, str]]:
         rows.append(("gear ratio", _describe_gear(plan.gear, "torque" in plan.columns)))
     if plan.joints:
         rows.append(("joints", f"{', '.join(plan.joints)}; the others of the robot are held at zero"))
+    if plan.controller:
+        rows.append(("controller", f"{plan.options['controller']} (given with --controller)"))
     if plan.unused:
         rows.append(("not used", describe_unused(plan.unused, plan.joint_names)))
     return [*rows, *(("doubtful", text) for text in plan.doubts)]

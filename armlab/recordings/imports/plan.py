@@ -8,9 +8,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from armlab.common.documents import Document
 from armlab.common.errors import InputError, UndecidedError
 from armlab.common.settings import suggest_name
 from armlab.recordings.imports.columns import Log, choose_columns, choose_commands
+from armlab.recordings.imports.controllers import ask_controller, read_controller
 from armlab.recordings.imports.doubtful import doubtful_units
 from armlab.recordings.imports.gears import Gear, choose_gear
 from armlab.recordings.imports.impossible import ask_impossible_units
@@ -37,7 +39,8 @@ class ImportPlan:
     options: as they were given. robot: None while it is open. sources: by the path of the run. columns: names by the
     signal. units: of each signal, one for all its columns or one a column. column_reasons, unit_reasons: why these, by
     the signal. gains: of the torque, where it is in A or V. gear: of signals that were measured at the motors. joints:
-    of the robot, in the order of the columns, where the recording has only some of them. doubts: what is probably, but
+    of the robot, in the order of the columns, where the recording has only some of them. controller:
+    the drive of a log of commands and positions, where the options state it. doubts: what is probably, but
     not surely, read in a wrong unit. unused: columns of the first file that hold numbers and are no signal.
     """
 
@@ -51,6 +54,7 @@ class ImportPlan:
     gains: tuple[float, ...] | None = None
     gear: Gear | None = None
     joints: tuple[str, ...] = ()
+    controller: Document | None = None
     doubts: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
     questions: tuple[Question, ...] = ()
@@ -65,9 +69,10 @@ class ImportPlan:
 def plan_import(files: Sequence[Path], options: Options, read: ReadSources = read_sources) -> ImportPlan:
     """What is known of an import, and the questions that are open.
 
-    options: out, robot, tip, lock, the columns of each signal, units, gains, gear_ratio, motor_side, joints, validate,
-    separator, decimal, topic, command_topic. read: reads a file; a form that plans after each answer gives one that
-    keeps what it read. Raises InputError for an option that cannot be right, whatever the answers to the questions are.
+    options: out, robot, tip, lock, the columns of each signal, units, gains, gear_ratio, motor_side, joints,
+    controller, validate, separator, decimal, topic, command_topic. read: reads a file; a form that plans after each
+    answer gives one that keeps what it read. Raises InputError for an option that cannot be right, whatever the
+    answers to the questions are.
     """
     robot, undecided = _read_robot(options)
     arm = robot.arm if robot else None
@@ -107,6 +112,10 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
     impossible = ask_impossible_units(numbers, units, gains, log.source.same_units)
     doubts = () if impossible or unscaled else doubtful_units(numbers, arm, units, gains, gear)
     robots = () if robot else (undecided or _ask_robot(files[0], count, log.joints),)
+    is_motion = "reference_position" in columns and "torque" not in columns
+    if options.get("controller") and not is_motion:
+        raise InputError("--controller belongs to a log of commands and positions, without --torque")
+    is_asked = is_motion and not options.get("controller") and not unnamed and not unmatched
     return ImportPlan(
         options=options,
         robot=robot,
@@ -120,7 +129,17 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
         doubts=(*doubts, *(robot.impossible if robot else ())),
         joints=log.joints if arm and (log.joints != whole or chosen) else (),
         unused=tuple(name for name in log.source.table.filled if name not in taken),
-        questions=(*robots, *unmatched, *unnamed, *unmeasured, *unscaled, *impossible, *_ask_out(files, options)),
+        controller=read_controller(options.get("controller"), len(log.joints) or 1),
+        questions=(
+            *robots,
+            *unmatched,
+            *unnamed,
+            *unmeasured,
+            *unscaled,
+            *impossible,
+            *(ask_controller(robot, log.joints) if is_asked else ()),
+            *_ask_out(files, options),
+        ),
     )
 
 
