@@ -68,11 +68,12 @@ MOVED = {
 
 _NOUNS: Mapping[str, tuple[str, Sections]] = {
     "recording": (
-        "Import, check and fetch recordings of robot arms.",
+        "Import, export, check and fetch recordings of robot arms.",
         {
             "Commands": {
                 "import": "armlab.cli.recording:import_",
                 "check": "armlab.cli.recording:check",
+                "export": "armlab.cli.recording:export",
                 "fetch": "armlab.cli.recording:fetch",
                 "example": "armlab.cli.recording:example",
                 "gains": "armlab.cli.identification:gains",

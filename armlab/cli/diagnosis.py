@@ -155,7 +155,7 @@ def next_experiment(
     from armlab.diagnosis.next.motion import Budget
 
     budget = Budget(duration, harmonics, algorithm, evaluations, seed)
-    return write_next_experiment(verdict, robot, recording, rivals, budget, links, safety, rate_hz, out)
+    return write_next_experiment(verdict, robot, recording, rivals, budget, links, safety, rate_hz, out, tell_progress)
 
 
 def _parse_dates(text: str | None) -> tuple[date, ...]:

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from armlab.cli.options import OutputPath, PagePath
-from armlab.cli.output import prints_result, trial_bar
+from armlab.cli.output import prints_result, tell_progress, trial_bar
 from armlab.common.documents import ResultLines
 
 DEFAULT_STORE = Path(".armlab/runs.sqlite")
@@ -71,7 +71,7 @@ def report(results: Path, store: Path, out: Path | None) -> ResultLines:
     """
     from bench.report.page import write_report
 
-    return write_report(results, store, out)
+    return write_report(results, store, out, tell_progress)
 
 
 @click.command()

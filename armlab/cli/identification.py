@@ -59,7 +59,7 @@ def identify(
     from armlab.identification.identify import IdentifyOptions, identify_recording
 
     options = IdentifyOptions(method, cutoff_hz, tolerance, choose, as_read)
-    return identify_recording(recording, out or recording, options)
+    return identify_recording(recording, out or recording, options, tell_progress)
 
 
 @click.command()

@@ -4,6 +4,7 @@ Apart from the click commands, since it imports the diagnosis, and `armlab --hel
 """
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import get_args
 
@@ -31,16 +32,17 @@ def write_next_experiment(
     safety: SafetySettings,
     rate_hz: float,
     out: Path,
+    progress: Callable[[str], None] = lambda message: None,
 ) -> ResultLines:
     """Designs and writes the next experiment, and yields the lines of its card.
 
-    Raises InputError for a file or an option that cannot be used.
+    progress: is told what is being done. Raises InputError for a file or an option that cannot be used.
     """
     refuse_inputs(
         (verdict, Path(robot)), (out / name for name in (CARD, PICTURE, *MOTION_FILES.values())), "the motion"
     )
     known_links: LinkKnowledge | None = next((each for each in get_args(LinkKnowledge) if each == links), None)
-    experiment = design_experiment(verdict, robot, recording, rivals, budget, known_links, safety)
+    experiment = design_experiment(verdict, robot, recording, rivals, budget, known_links, safety, progress)
     yield from card_lines(experiment)
     card = card_content(experiment)
     files: dict[str, str | bytes] = {CARD: json.dumps(card, indent=1, allow_nan=False) + "\n"}

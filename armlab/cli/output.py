@@ -13,6 +13,7 @@ from typing import Any
 
 import click
 
+from armlab.cli.progress import Progress
 from armlab.common.documents import Document, FailedResultError, ResultLines, json_text
 
 _PROGRESS = "armlab.progress"  # key of the running command's progress in click's context
@@ -23,24 +24,6 @@ quiet_option = click.option("--quiet", is_flag=True, help="Print no lines and no
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON document.")
 
 
-class Progress:
-    """Tells on the terminal's error stream, in one line, what is being done; nothing where that is no terminal."""
-
-    def __init__(self, quiet: bool) -> None:
-        self.shown = sys.stderr.isatty() and not quiet
-        self.quiet = quiet
-
-    def tell(self, message: str) -> None:
-        """Show a message in place of the one before."""
-        if self.shown:
-            click.echo(f"\r\033[K{message} ...", nl=False, err=True)
-
-    def clear(self) -> None:
-        """Take the message away."""
-        if self.shown:
-            click.echo("\r\033[K", nl=False, err=True)
-
-
 def tell_progress(message: str) -> None:
     """Tell what the running command is doing; nothing under `--quiet` and outside a command."""
     progress = _current_progress()
@@ -49,9 +32,16 @@ def tell_progress(message: str) -> None:
 
 
 def can_ask() -> bool:
-    """Whether someone can answer questions: a terminal at both ends, and neither `--quiet` nor `--json`."""
+    """Whether someone can answer questions: a terminal at both ends, and neither `--quiet` nor `--json`.
+
+    Then the progress falls silent.
+    """
     silent = click.get_current_context().meta.get(_SILENT, False)
-    return not silent and sys.stdin.isatty() and sys.stdout.isatty()
+    asks = not silent and sys.stdin.isatty() and sys.stdout.isatty()
+    progress = _current_progress()
+    if asks and progress is not None:
+        progress.stop()  # a line that comes each second would stand over the questions
+    return asks
 
 
 def trial_bar(total: int, done: int) -> Any:
@@ -59,6 +49,8 @@ def trial_bar(total: int, done: int) -> Any:
     from tqdm import tqdm
 
     progress = _current_progress()
+    if progress is not None:
+        progress.stop()
     hidden = True if progress is not None and progress.quiet else None  # None: shown on a terminal alone
     return tqdm(total=total, initial=done, unit="trial", disable=hidden)
 
@@ -73,7 +65,7 @@ def prints_lines(command: Callable[..., Iterable[str]]) -> Callable[..., None]:
             for line in command(**options):
                 _print_line(line, progress)
         finally:
-            progress.clear()
+            progress.stop()
 
     return quiet_option(run)
 
@@ -92,7 +84,7 @@ def prints_result(command: Callable[..., ResultLines]) -> Callable[..., None]:
             _print_document(error.document, as_json)
             raise
         finally:
-            progress.clear()
+            progress.stop()
         _print_document(document, as_json)
 
     return json_option(quiet_option(run))
@@ -135,9 +127,15 @@ def _print_document(document: Document, as_json: bool) -> None:
 
 
 def _start_progress(quiet: bool) -> Progress:
-    progress = Progress(quiet)
+    progress = Progress(_command_name(), quiet)
+    progress.start()
     click.get_current_context().meta[_PROGRESS] = progress
     return progress
+
+
+def _command_name() -> str:
+    """`recording check` of `armlab recording check`."""
+    return click.get_current_context().command_path.partition(" ")[2]
 
 
 def _current_progress() -> Progress | None:

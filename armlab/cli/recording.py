@@ -48,7 +48,8 @@ def check(folder: Path, out: Path | None) -> ResultLines:
     from armlab.recordings.check import check_recording
     from armlab.recordings.check_report import write_check_page
 
-    found = check_recording(folder)
+    found = check_recording(folder, tell_progress)
+    tell_progress("drawing the page")
     page = write_check_page(found, out or Path(f"{found.recording.name}-check.html"))
     document = found.document | {"files": [page]}
     yield from found.lines or ("nothing was repaired and nothing looks wrong",)
@@ -94,6 +95,25 @@ def example(folder: Path) -> None:
         click.echo(path)
 
 
+@click.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.argument("out", type=OutputPath())
+@click.option("--task", default="Move the arm.", show_default=True, help="What the arm does, in a sentence.")
+@click.option("--fps", type=click.IntRange(min=1), help="Frames a second [default: the rate of the first run].")
+@prints_result
+def export(folder: Path, out: Path, task: str, fps: int | None) -> ResultLines:
+    """Write FOLDER as a LeRobot dataset.
+
+    FOLDER: a recording of motion only. Writes a new folder OUT, version 3.0: an episode a run, the command as action,
+    angles in degrees.
+    """
+    from armlab.recordings.lerobot_dataset import write_lerobot
+
+    dataset = write_lerobot(folder, out, task, fps)
+    yield f"{dataset}: a LeRobot dataset, version 3.0"
+    return {"dataset": dataset}
+
+
 def _column_options(command: Callable[..., None]) -> Callable[..., None]:
     for signal in reversed((*ASKED_SIGNALS, *OPTIONAL_SIGNALS)):
         flag = f"--{signal.replace('_', '-')}"
@@ -124,7 +144,9 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
 )
 @click.option("--joints", metavar="NAMES", help="Motion only: joints of the robot in the order of the columns.")
 @click.option(
-    "--controller", metavar="KEY=VALUES ...", help="Motion only: the drive, as 'kp=25 kd=5 delay=0.1', SI units."
+    "--controller",
+    metavar="KEY=VALUES ...",
+    help="Motion only: the drive, as 'kp=25 kd=5 delay=0.1', SI units, or a .py file with actuators of Isaac Lab.",
 )
 @click.option("--validate", multiple=True, type=click.Path(path_type=Path), help="File with role validate.")
 @click.option("--separator", help="Separator of a text file: a character or a word (tab, blank).")

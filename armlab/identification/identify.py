@@ -1,6 +1,6 @@
 """The flows of `armlab identify` and `armlab predict`: from a recording folder to lines, a model file and a page."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -158,24 +158,30 @@ class IdentifyOptions:
     as_read: bool = False
 
 
-def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> ResultLines:
+def identify_recording(
+    folder: Path, out: Path, options: IdentifyOptions, progress: Callable[[str], None] = lambda message: None
+) -> ResultLines:
     """Identifies, writes model.yaml and report.html into `out`, and yields lines with parameters and errors.
 
-    The document has the content of the model and the errors of each run.
+    The document has the content of the model and the errors of each run. progress: is told what is being done.
 
     Raises InputError, in one line, for a recording that cannot be used or is read wrongly, and options that do not fit
     it. `corrected/` in `out` then holds the recording as it should be read.
     """
+    progress("reading the recording")
     recording = load_recording(folder)
     require_identifiable(recording)
     runs = recording.runs_to_identify()
     if options.tolerance and recording.arm.links is None:
         raise InputError(f"--tolerance needs nominal `links`, and the robot {recording.arm.name} has none")
     if not options.as_read:
+        progress("asking how it is to be read")
         _refuse_wrong_reading(recording, out)
     require_possible(recording)
+    progress("choosing cut-off and components" if options.choose else "choosing the cut-off")
     try:
         identifier, how = _build_identifier(recording, options)
+        progress("fitting")
         identifier.fit(runs)
     except DataError as error:
         raise InputError(f"{folder}: {error}") from None
@@ -190,6 +196,7 @@ def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Res
     if not recording.with_role("validate"):
         yield NO_VALIDATION_WARNING
     yield from overfit_warnings(errors)
+    progress("drawing the page")
     page = identification_page(recording, identifier, errors)
     file, report = write_texts({"model.yaml": model_text(model, out), "report.html": page}, out)
     yield f"model: {file}"

@@ -220,11 +220,12 @@ class CheckResult:
         }
 
 
-def check_recording(folder: Path) -> CheckResult:
+def check_recording(folder: Path, progress: Callable[[str], None] = lambda message: None) -> CheckResult:
     """Reads and examines a recording; a run that cannot be used is reported beside the others.
 
-    Raises InputError where `recording.yaml` or the robot file is wrong.
+    progress: is told what is being done. Raises InputError where `recording.yaml` or the robot file is wrong.
     """
+    progress("reading the recording")
     if is_motion_only(folder):
         moved, file = open_motion_recording(folder)
         motions, refused = _read_runs(lambda entry: load_motion_runs(moved, file, entry), file)
@@ -239,6 +240,7 @@ def check_recording(folder: Path) -> CheckResult:
     whole = with_runs(empty, runs)
     tells_nothing = _find_nothing_to_identify(whole)
     is_readable = bool(runs) and not has_no_torque(runs) and reason_still(runs) is None
+    progress("asking how it is to be read")
     geometry = (*tells_nothing, *(_check_geometry(whole) if is_readable else ()))
     beside = _compare_with_simulator(whole, with_actuators=False)
     beside = (*_find_impossible_links(whole), *_stated_laws(whole.arm), *beside)

@@ -3,7 +3,8 @@ its charts.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -161,28 +162,39 @@ def _read_asset(name: str) -> str:
     return (files("bench.report") / "assets" / name).read_text(encoding="utf-8")
 
 
-def write_report(where: Path, store: Path, out: Path | None) -> ResultLines:
+def write_report(
+    where: Path, store: Path, out: Path | None, progress: Callable[[str], None] = lambda message: None
+) -> ResultLines:
     """Write the page about results; tells the table, who beats whom, and the file.
+
+    progress: is told what is being done.
 
     Raises InputError, in one line, if there are no results.
     """
+    progress("reading results")
     results = read_results(where, store)
     path = out or Path("results") / f"{results.name}_report.html"
     make_folder(path.parent)
-    write_whole(path, report_page(results, analyse_cells(results), _measure_participants(results, store)))
+    facts = _measure_participants(results, store, progress)
+    progress("comparing algorithms")
+    write_whole(path, report_page(results, analyse_cells(results), facts))
     yield from results.missing
     yield from describe_frame(results.trials)
     return (yield from written_files([path]))
 
 
-def _measure_participants(results: ResultSet, store: Path) -> list[AlgorithmProperties]:
+def _measure_participants(
+    results: ResultSet, store: Path, progress: Callable[[str], None]
+) -> list[AlgorithmProperties]:
     """Properties of the algorithms that took part and are registered here; results may come from elsewhere.
 
     They are measured once and kept in the run store, if there is one.
     """
     took_part = dict.fromkeys(entry["name"] for entry in yaml.safe_load(results.settings)["algorithms"].values())
     names = [name for name in took_part if name in registered()]
-    if not store.exists():
-        return [found for name in names if (found := measure_isolated(name)) is not None]
-    with open_store(store) as opened:
-        return [found for name in names if (found := stored_properties(name, opened)) is not None]
+    found = []
+    with open_store(store) if store.exists() else nullcontext() as opened:
+        for number, name in enumerate(names, 1):
+            progress(f"measuring algorithms, {number} of {len(names)}")
+            found.append(measure_isolated(name) if opened is None else stored_properties(name, opened))
+    return [each for each in found if each is not None]

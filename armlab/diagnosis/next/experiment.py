@@ -3,6 +3,7 @@ chances of a decision.
 """
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -82,19 +83,27 @@ def design_experiment(
     budget: Budget,
     links: LinkKnowledge | None,
     safety: SafetySettings,
+    progress: Callable[[str], None] = lambda message: None,
 ) -> Experiment:
-    """Designs the next experiment; InputError, in one line, for anything that cannot be used."""
+    """Designs the next experiment; InputError, in one line, for anything that cannot be used.
+
+    progress: is told what is being done.
+    """
     began = time.perf_counter()
+    progress("reading the verdict")
     loaded_verdict, arm = read_verdict(verdict), load_arm(robot)
     recorded = None if recording is None else load_recording(recording)
     _check_same_joints(arm, recorded)
     place = None if recorded is None else recorded_place(recorded)
     rules = safety_rules(arm, robot, limits_in_force(arm, recorded), safety, place)
+    progress("preparing the questions")
     prepared, excitation = _prepare(loaded_verdict, arm, recorded, rivals, budget, links, rules)
     problem = point = report = None
     if any(question.pairs for question in prepared.questions):
+        progress("searching the motion")
         problem = tell_apart_problem(prepared, excitation)
         point, report = secure_motion(problem, search_motion(problem, budget), rules)
+    progress("weighing what the motion tells")
     pairs = _compare_pairs(prepared, excitation, problem, point, budget)
     chances = tuple(_question_chances(prepared, question, problem, point, budget) for question in prepared.questions)
     return Experiment(prepared, excitation, budget, problem, point, pairs, chances, report, time.perf_counter() - began)

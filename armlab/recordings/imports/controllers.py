@@ -1,4 +1,6 @@
-"""The drive of the simulation, as an import takes it: `--controller "kp=25 kd=5 delay=0.1"`, or a question for it."""
+"""The drive of the simulation, as an import takes it: `--controller "kp=25 kd=5 delay=0.1"`, a configuration of Isaac
+Lab, or a question for it.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,6 +8,7 @@ from typing import Any
 
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name, to_plain_data, validate
+from armlab.recordings.imports.isaac_lab import read_isaac_lab
 from armlab.recordings.imports.questions import Question
 from armlab.recordings.imports.robots import ImportedRobot
 from armlab.recordings.motion import PER_JOINT_KEYS
@@ -19,25 +22,35 @@ FILTERS = (2, 3)  # MuJoCo's mjDYN_FILTER and mjDYN_FILTEREXACT, as numbers of a
 KEYS = tuple(key for key in ControllerEntry.model_fields if key != "type")
 
 
-def read_controller(given: str | None, joints: int) -> dict[str, Any] | None:
-    """The key `controller` of `recording.yaml`; None where nothing is given.
+def read_controller(given: str | None, joints: Sequence[str]) -> dict[str, Any] | None:
+    """The key `controller` of `recording.yaml`; None where nothing is given, and while the robot is open.
 
-    given: KEY=VALUES with blanks between; values have commas between them, one a joint, or one for all joints.
+    given: KEY=VALUES with blanks between; values have commas between them, one a joint, or one for all joints; or a
+    Python file with actuators of Isaac Lab. joints: names, in the order of the columns.
     Raises InputError for an unknown key, and for what is no number.
     """
-    if not given:
+    if not given or not joints:
         return None
+    if given.endswith(".py"):
+        read = read_isaac_lab(Path(given), joints)
+        return _checked({key: values for key, values in read.items() if any(each is not None for each in values)})
     content: dict[str, Any] = {}
     for part in given.split():
         key, equals, text = part.partition("=")
         if not equals or key not in KEYS:
             raise InputError(f"{OPTION} {part}: should be KEY=VALUES: {suggest_name(key, KEYS)}")
         values = [_read_value(each, part) for each in text.split(",")]
-        if key in PER_JOINT_KEYS and len(values) not in (1, joints):
-            raise InputError(f"{OPTION} {part}: should hold one number, or {joints}, one a joint, not {len(values)}")
-        content[key] = values * (joints if len(values) == 1 else 1) if key in PER_JOINT_KEYS else values[0]
-    content = {"type": "pd", "kd": [None] * joints, **content}
-    return dict(to_plain_data(validate(ControllerEntry, content, OPTION).model_dump(exclude_unset=True)))
+        if key in PER_JOINT_KEYS and len(values) not in (1, len(joints)):
+            raise InputError(
+                f"{OPTION} {part}: should hold one number, or {len(joints)}, one a joint, not {len(values)}"
+            )
+        content[key] = values * (len(joints) if len(values) == 1 else 1) if key in PER_JOINT_KEYS else values[0]
+    return _checked({"kd": [None] * len(joints), **content})
+
+
+def _checked(content: dict[str, Any]) -> dict[str, Any]:
+    entry = validate(ControllerEntry, {"type": "pd", **content}, OPTION)
+    return dict(to_plain_data(entry.model_dump(exclude_unset=True)))
 
 
 def _read_value(text: str, part: str) -> float | str | None:

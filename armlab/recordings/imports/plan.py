@@ -129,7 +129,7 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
         doubts=(*doubts, *(robot.impossible if robot else ())),
         joints=log.joints if arm and (log.joints != whole or chosen) else (),
         unused=tuple(name for name in log.source.table.filled if name not in taken),
-        controller=read_controller(options.get("controller"), len(log.joints) or 1),
+        controller=read_controller(options.get("controller"), log.joints),
         questions=(
             *robots,
             *unmatched,

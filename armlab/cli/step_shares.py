@@ -1,0 +1,6 @@
+"""x"""
+
+from collections.abc import Mapping
+
+USUAL_S: Mapping[str, float] = {}
+SHARES: Mapping[str, Mapping[str, float]] = {}
