@@ -117,6 +117,7 @@ def _print_lines(lines: ResultLines, progress: Progress, hidden: bool) -> Docume
 
 def _print_line(line: str, progress: Progress) -> None:
     progress.clear()
+    progress.take_line(line)
     if not progress.quiet:
         click.echo(line)
 

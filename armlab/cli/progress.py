@@ -1,7 +1,8 @@
 """What a long command shows on the terminal's error stream: what is being done, for how long, and the time left.
 
-The time left is t (1 - s) / s, where a share s of the work is done after t seconds. A message with "2 of 5" in it tells
-s itself; of the other messages `step_shares.py` knows what share of its command has passed when they come.
+The time left is t (1 - s) / s, where a share s of the work is done after t seconds. `step_shares.py` knows what share
+of its command has passed when a message comes. Of a message with "2 of 5" in it that is unknown there, s is the share
+of this step alone, and t counts from its first message.
 """
 
 import re
@@ -52,7 +53,7 @@ class Progress:
         self.shown = sys.stderr.isatty() and not quiet
         self._command, self._clock, self._start = command, clock, clock()
         self._message, self._steps = "", known_steps(command)
-        self._share, self._share_at = 0.0, self._start
+        self._step, self._since, self._share, self._share_at = "", self._start, 0.0, self._start
         self._lock, self._ended = threading.Lock(), threading.Event()
         self._ticker: threading.Thread | None = None
 
@@ -73,14 +74,32 @@ class Progress:
     def tell(self, message: str) -> None:
         """Show a message in place of the one before."""
         with self._lock:
-            if not self._message:
-                own = known_steps(f"{self._command}: {step_key(message)}")
-                self._steps = own if own.usual_s is not None else self._steps
-            self._message = message
-            share = self._share_of(message)
-            if share > self._share:
-                self._share, self._share_at = share, self._clock()
+            self._take(message)
             self._write(self.line())
+
+    def take_line(self, line: str) -> None:
+        """Learn from a line of the result with "2 of 5" in it how far the command is."""
+        with self._lock:
+            if COUNTED.search(line):
+                self._take(line.strip())
+
+    def _take(self, message: str) -> None:
+        key, counted, now = step_key(message), COUNTED.search(message), self._clock()
+        if not self._message:
+            own = known_steps(f"{self._command}: {key}")
+            self._steps = own if own.usual_s is not None else self._steps
+        self._message = message
+        within = (int(counted[1]) - 1) / max(int(counted[2]), 1) if counted else 0.0
+        known = self._steps.shares.get(key)
+        if known is not None:
+            share = known + (self._steps.end_of(key) - known) * min(within, 1.0)
+            if share > self._share:
+                self._share, self._share_at = share, now
+        elif counted and not self._steps.shares:
+            step = key.partition(":")[0]
+            if step != self._step:
+                self._step, self._since = step, now
+            self._share, self._share_at = min(within, 1.0), now
 
     def clear(self) -> None:
         """Take the line away."""
@@ -97,21 +116,13 @@ class Progress:
 
     def _left_in_words(self, passed: float) -> str:
         if self._share >= MIN_SHARE:
-            until_share = self._share_at - self._start
-            left = until_share * (1 - self._share) / self._share - (passed - until_share)
+            spent = self._share_at - self._since
+            left = spent * (1 - self._share) / self._share - (self._clock() - self._share_at)
         elif self._steps.usual_s is not None:
             left = self._steps.usual_s - passed
         else:
             return ""
         return f", about {in_time_words(left)} left" if left > 0 else ", longer than usual"
-
-    def _share_of(self, message: str) -> float:
-        key, counted = step_key(message), COUNTED.search(message)
-        known = self._steps.shares.get(key)
-        if counted is None or int(counted[2]) == 0:
-            return known or 0.0
-        within = min((int(counted[1]) - 1) / int(counted[2]), 1.0)
-        return within if known is None else known + (self._steps.end_of(key) - known) * within
 
     def _tick(self) -> None:
         while not self._ended.wait(TICK_S):

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.files import all_or_none
 from armlab.recordings.motion import load_motion_recording
@@ -75,7 +75,7 @@ def _episode(run: MotionRun, arm: Arm, fps: int) -> pd.DataFrame:
     return pd.DataFrame({**columns, **stamps})
 
 
-def _episodes(lengths: Array, task: str) -> pd.DataFrame:
+def _episodes(lengths: NDArray[np.integer], task: str) -> pd.DataFrame:
     ends = np.cumsum(lengths)
     places = dict.fromkeys(
         ("data/chunk_index", "data/file_index", "meta/episodes/chunk_index", "meta/episodes/file_index"), 0
@@ -84,7 +84,7 @@ def _episodes(lengths: Array, task: str) -> pd.DataFrame:
     return table.assign(length=lengths, dataset_from_index=ends - lengths, dataset_to_index=ends, **places)
 
 
-def _info(robot: str, arm: Arm, fps: int, lengths: Array) -> dict[str, Any]:
+def _info(robot: str, arm: Arm, fps: int, lengths: NDArray[np.integer]) -> dict[str, Any]:
     vector = {"dtype": "float32", "shape": [len(arm)], "names": [f"{joint.name}.pos" for joint in arm.joints]}
     scalars = {**SCALARS, "task_index": "int64"}
     return {

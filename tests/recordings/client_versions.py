@@ -1,4 +1,4 @@
-"""The table of `docs/clients.md`, what was tried with which version; writes it when it is run."""
+"""The table of `docs/recordings.md`, what was tried with which version; writes it when it is run."""
 
 from importlib.metadata import version
 from pathlib import Path
@@ -8,8 +8,8 @@ import yaml
 from armlab.common.markdown import markdown_table
 from armlab.recordings.lerobot_dataset import VERSION
 
-PAGE = Path(__file__).parents[2] / "docs/clients.md"
-BEGIN, END = "<!-- Written by tests/recordings/client_versions.py: do not edit. -->", "<!-- End of what is written. -->"
+PAGE = Path(__file__).parents[2] / "docs/recordings.md"
+BEGIN, END = "<!-- Written by tests/recordings/client_versions.py: do not edit. -->", "<!-- End of the clients. -->"
 FIELDS = Path(__file__).parents[1] / "diagnosis/simulator_fields.yaml"
 
 

@@ -501,6 +501,19 @@ BROKEN = (
         command="identify",
     ),
     OddLog(
+        "a column of torque is a multiple of another",
+        csv("log.csv", lambda table: table.assign(tau3=-0.5 * table["tau2"])),
+        "The torque of joints 2 and 3 differs by the factor -0.5 in every row",
+        is_read=False,
+        command="identify",
+    ),
+    OddLog(
+        "a second torque beside the measured one",
+        csv("log.csv", lambda table: table.assign(tauSm1=table["tau1"], tauSm2=table["tau2"], tauSm3=table["tau3"])),
+        "the file holds 2 torques of each joint (tau1, tau2, tau3; tauSm1, tauSm2, tauSm3)",
+        is_read=False,
+    ),
+    OddLog(
         "a column of positions is a copy of another",
         csv("log.csv", lambda table: table.assign(q1=table["q3"])),
         "The position of joints 1 and 3 is the same in every row",

@@ -39,8 +39,8 @@ def study_conditioning(
     names = [name for name in ARMS if not only or name in only]
     opened = [open_public_recording(name, recordings) for name in names]
     looks, studies = Looks(results / LOOKS_FILE), list[ConditioningStudy]()
-    for name, recording in zip(names, opened, strict=True):
-        progress(f"{name}: windows")
+    for number, (name, recording) in enumerate(zip(names, opened, strict=True), 1):
+        progress(f"windows of {name}, {number} of {len(names)}")
         for run in recording.with_role("validate"):
             looks.note(name, run.name, "conditioning")
         studies.append(study_arm(recipe_named(name), recording))

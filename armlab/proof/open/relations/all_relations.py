@@ -41,10 +41,10 @@ def check_relations(
     outcomes: list[RelationOutcome] = []
     for recording in _at_hand(recordings, folders, only):
         desk = Desk()
-        for name in names:
+        for number, name in enumerate(names, 1):
             key = _key(recording, name)
             if key not in stored:
-                progress(f"{recording.name}: {name}")
+                progress(f"relations of {recording.name}, {number} of {len(names)}: {name}")
                 stored[key] = check_relation(name, recording, desk)
                 _append(results / STORE, key, stored[key])
             outcomes.append(stored[key])
