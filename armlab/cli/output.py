@@ -34,13 +34,13 @@ def tell_progress(message: str) -> None:
 def can_ask() -> bool:
     """Whether someone can answer questions: a terminal at both ends, and neither `--quiet` nor `--json`.
 
-    Then the progress falls silent.
+    Then progress shows no line each second.
     """
     silent = click.get_current_context().meta.get(_SILENT, False)
     asks = not silent and sys.stdin.isatty() and sys.stdout.isatty()
     progress = _current_progress()
     if asks and progress is not None:
-        progress.stop()  # a line that comes each second would stand over the questions
+        progress.stop_ticking()  # a line that comes each second would stand over the questions
     return asks
 
 

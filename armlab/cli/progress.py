@@ -63,13 +63,18 @@ class Progress:
             self._ticker = threading.Thread(target=self._tick, daemon=True)
             self._ticker.start()
 
-    def stop(self) -> None:
-        """Show nothing more, and take the line away."""
+    def stop_ticking(self) -> None:
+        """Show a line only when a message is told."""
         self._ended.set()
         if self._ticker is not None:
             self._ticker.join()
             self._ticker = None
+
+    def stop(self) -> None:
+        """Show nothing more, and take the line away."""
+        self.stop_ticking()
         self.clear()
+        self.shown = False
 
     def tell(self, message: str) -> None:
         """Show a message in place of the one before."""
@@ -131,7 +136,7 @@ class Progress:
                     self._write(self.line())
 
     def _write(self, text: str) -> None:
-        if self.shown and not (self._ended.is_set() and text):
+        if self.shown:
             click.echo(f"\r\033[K{text}", nl=False, err=True)
 
 

@@ -163,7 +163,7 @@ def _check_velocity_scale(run: MotionRun, velocity: Array, slope: Array, arm: Ar
         period = float(np.median(np.diff(run.time[jumps])))
         text += (
             f", and fits it between jumps of the position, one every {period:.3g} s: rows are missing there while the "
-            "stamps go on, so the clock of the file is too fast"
+            "stamps go on, so the clock of the file is too slow"
         )
         return _joint_warning("lost_rows", joint, text)
     return _joint_warning("velocity_mismatch", joint, f"{text}: another unit or gear?")
