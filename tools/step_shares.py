@@ -39,6 +39,7 @@ def commands_of(recording: Path, work: Path) -> Iterator[list[str]]:
         return
     yield ["identify", str(recording), "--out", str(work / "model")]
     yield ["identify", str(recording), "--select", "--as-read", "--out", str(work / "selected")]
+    yield ["predict", str(work / "selected" / "model.yaml"), str(recording)]
     yield ["payload", str(recording)]
     name = read_recording_file(recording).robot
     robot = str(recording / name) if (recording / name).is_file() else name
