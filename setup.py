@@ -5,6 +5,7 @@ from setuptools import setup
 setup(
     cffi_modules=[
         "problem/kernel_build.py:ffibuilder",
+        "problem/spectra_build.py:ffibuilder",
         "armlab/effects/drive_train_build.py:ffibuilder",
         "armlab/diagnosis/motion/joint_replay_build.py:ffibuilder",
         "armlab/proof/blind/servo/servo_arm_build.py:ffibuilder",

@@ -15,10 +15,11 @@ from problem.arm import Arm
 from problem.base_parameters import BaseParameters
 from problem.contract import DifferentiableProblem, Evaluation, Problem, why_not_differentiable
 from problem.coupled_joints import refuse_coupled
-from problem.fitness import Criterion, condition_number, singular_values
+from problem.fitness import Criterion
 from problem.limits import Constraints
 from problem.motion import Motion
 from problem.smooth import LimitRows, differentiate
+from problem.spectrum import Spectrum, find_spectrum
 from problem.trajectories import Trajectory, sample_instants
 
 
@@ -126,12 +127,12 @@ class ExcitationProblem:
 
     def _judge(self, motion: Motion) -> tuple[Array, Array]:
         """Criterion and condition number of motions (points, samples, joints), (points,) each."""
-        values = self.singular_values(motion)
-        return self.criterion.value(values), condition_number(values)
+        spectrum = self.spectrum(motion)
+        return self.criterion.value(spectrum), spectrum.condition_number
 
-    def singular_values(self, motion: Motion) -> Array:
-        """Singular values (points, columns), descending, that judge motions (points, samples, joints)."""
-        return singular_values(self.arm, motion, self.base.columns, self.unit_columns, self.friction_columns)
+    def spectrum(self, motion: Motion) -> Spectrum:
+        """The spectrum that judges motions (points, samples, joints)."""
+        return find_spectrum(self.arm, motion, self.base.columns, self.unit_columns, self.friction_columns)
 
 
 MAX_SHIFT_WIDTHS = 2.0  # widths of the box by which the origin may move

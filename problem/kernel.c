@@ -11,6 +11,7 @@
 #define HALVES 2 /* vectors of sums of a Gram matrix: eight partial sums of every eighth sample */
 #define MAX_JOINTS 16
 #define MAX_OWNED 3
+#define MAX_COLUMNS (MAX_JOINTS * (10 + MAX_OWNED))
 typedef double V __attribute__((vector_size(8 * LANES)));
 typedef int64_t I __attribute__((vector_size(8 * LANES)));
 #define INLINE static inline __attribute__((always_inline))
@@ -227,10 +228,15 @@ INLINE void torques_of_samples(int joints, const JointData *data, const double *
 
 /* Some samples of one trajectory, (samples, joints) in memory, as one vector a joint; missing ones are 0. */
 INLINE void load(int joints, int count, const double *from, V *to) {
+    if (count == LANES) {
+        const double *a = from, *b = a + joints, *c = b + joints, *d = c + joints;
+        for (int j = 0; j < joints; j++) to[j] = (V){a[j], b[j], c[j], d[j]};
+        return;
+    }
     for (int j = 0; j < joints; j++) {
-        double lanes[LANES] = {0};
+        V lanes = {0};
         for (int l = 0; l < count; l++) lanes[l] = from[l * joints + j];
-        memcpy(to + j, lanes, sizeof lanes);
+        to[j] = lanes;
     }
 }
 
@@ -256,52 +262,101 @@ void observation_matrices(int joints, const JointData *data, const double *gravi
     }
 }
 
+/* A Gram matrix is summed in tiles of TILE by TILE entries, whose sums stay in registers over a chunk of samples. The
+ * rows of the chunk are kept in panels of TILE columns: [panel][block of samples][joint][TILE], zero where a column is
+ * zero in the row of a joint. */
+#define TILE 3
+#define CHUNK 8 /* blocks of LANES samples: the panels of seven joints stay in the cache of the core */
+
+/* Adds the products of two panels to the sums of a tile, over the first so many rows of each block, in which alone the
+ * left one can be non-zero; stride: from block to block. */
+INLINE void add_tile(int blocks, int rows, int64_t stride, const V *left, const V *right, V *sums) {
+    for (int half = 0; half < HALVES; half++, sums += TILE * TILE) {
+        V s[TILE * TILE];
+        memcpy(s, sums, sizeof s);
+        for (int b = half; b < blocks; b += HALVES) {
+            const V *l = left + b * stride, *r = right + b * stride;
+            for (const V *end = l + rows * TILE; l < end; l += TILE, r += TILE)
+                for (int k = 0; k < TILE; k++)
+                    for (int c = 0; c < TILE; c++) s[k * TILE + c] += l[k] * r[c];
+        }
+        memcpy(sums, s, sizeof s);
+    }
+}
+
+INLINE int panels_of(int n) { return (n + TILE - 1) / TILE; }
+
+/* Numbers of scratch memory for Gram matrices of n columns: the panels, the tiles and what aligns them. */
+int64_t gram_scratch(int joints, int n) {
+    int64_t panels = panels_of(n);
+    return LANES * (panels * CHUNK * joints * TILE + panels * (panels + 1) / 2 * HALVES * TILE * TILE + 1);
+}
+
 /* Gram matrix of chosen columns of each trajectory's observation matrix, and of further columns behind them, joint by
  * joint, that are zero in the rows of all other joints; (trajectories, n, n) with n = chosen + owned * joints.
  * columns: ascending; first[i]: the first chosen column that can be non-zero in the row of joint i.
- * own: the further columns in the rows of their joints, (trajectories, samples, joints, owned), owned <= MAX_OWNED. */
+ * own: the further columns in the rows of their joints, (trajectories, samples, joints, owned), owned <= MAX_OWNED.
+ * scratch: as long as gram_scratch says. Each entry is the sum over the samples in order, in eight parts. */
 FOR_EACH_PROCESSOR
 void gram_matrices(int joints, const JointData *data, const double *gravity, int64_t trajectories, int64_t samples,
                    const double *q, const double *qd, const double *qdd, int chosen, const int *columns,
                    const int *first, int owned, const double *own, double *scratch, double *out) {
     V vq[MAX_JOINTS], vqd[MAX_JOINTS], vqdd[MAX_JOINTS], rows[MAX_JOINTS * MAX_JOINTS * 10];
-    V row[MAX_JOINTS * 10], vown[MAX_JOINTS * MAX_OWNED];
-    V *sums = (V *)(((uintptr_t)scratch + sizeof(V) - 1) & ~(uintptr_t)(sizeof(V) - 1));
-    int width = 10 * joints, n = chosen + owned * joints;
+    V vown[MAX_JOINTS * MAX_OWNED];
+    int width = 10 * joints, n = chosen + owned * joints, panels = panels_of(n);
+    int64_t panel = CHUNK * joints * TILE, tiles = panels * (panels + 1) / 2;
+    V *chunk = (V *)(((uintptr_t)scratch + sizeof(V) - 1) & ~(uintptr_t)(sizeof(V) - 1));
+    V *sums = chunk + panels * panel;
+    int64_t places[MAX_COLUMNS]; /* of each column, in the rows of the first joint of the first block */
+    int rows_of[MAX_COLUMNS];    /* each panel: up to the last joint in whose rows it can be non-zero */
+    memset(rows_of, 0, sizeof rows_of);
+    for (int k = 0; k < n; k++) {
+        int last = k < chosen ? joints - 1 : (k - chosen) / owned;
+        while (k < chosen && first[last] > k) last--;
+        places[k] = k / TILE * panel + k % TILE;
+        rows_of[k / TILE] = last + 1 > rows_of[k / TILE] ? last + 1 : rows_of[k / TILE];
+    }
+    memset(chunk, 0, sizeof(V) * panels * panel);
     for (int64_t p = 0; p < trajectories; p++) {
-        memset(sums, 0, sizeof(V) * HALVES * n * n);
-        for (int64_t s = 0; s < samples; s += LANES) {
-            int64_t at = (p * samples + s) * joints;
-            int count = at_most_lanes(samples - s);
-            V *half = sums + (s / LANES % HALVES) * n * n;
-            load(joints, count, q + at, vq);
-            load(joints, count, qd + at, vqd);
-            load(joints, count, qdd + at, vqdd);
-            load(joints * owned, count, own + at * owned, vown);
-            rows_of_samples(joints, data, gravity, vq, vqd, vqdd, rows);
-            V present;
-            for (int l = 0; l < LANES; l++) present[l] = l < count;
-            for (int i = 0; i < joints; i++) {
-                const V *mine = vown + i * owned;
-                int behind = chosen + i * owned;
-                for (int k = first[i]; k < chosen; k++) row[k] = rows[i * width + columns[k]];
-                if (count < LANES)
-                    for (int k = first[i]; k < chosen; k++) row[k] *= present;
-                for (int k = first[i]; k < chosen; k++) {
-                    V value = row[k], *sum = half + k * n;
-                    for (int c = k; c < chosen; c++) sum[c] += value * row[c];
-                    for (int c = 0; c < owned; c++) sum[behind + c] += value * mine[c];
+        memset(sums, 0, sizeof(V) * HALVES * TILE * TILE * tiles);
+        for (int64_t from = 0; from < samples; from += CHUNK * LANES) {
+            int blocks = 0;
+            for (int64_t s = from; s < samples && blocks < CHUNK; s += LANES, blocks++) {
+                int64_t at = (p * samples + s) * joints;
+                int count = at_most_lanes(samples - s);
+                load(joints, count, q + at, vq);
+                load(joints, count, qd + at, vqd);
+                load(joints, count, qdd + at, vqdd);
+                load(joints * owned, count, own + at * owned, vown);
+                rows_of_samples(joints, data, gravity, vq, vqd, vqdd, rows);
+                V present;
+                for (int l = 0; l < LANES; l++) present[l] = l < count;
+                for (int i = 0; i < joints; i++) {
+                    V *place = chunk + (blocks * joints + i) * TILE;
+                    const V *from_row = rows + i * width;
+                    if (count == LANES)
+                        for (int k = first[i]; k < chosen; k++) place[places[k]] = from_row[columns[k]];
+                    else
+                        for (int k = first[i]; k < chosen; k++) place[places[k]] = from_row[columns[k]] * present;
+                    for (int c = 0; c < owned; c++) place[places[chosen + i * owned + c]] = vown[i * owned + c];
                 }
-                for (int k = 0; k < owned; k++)
-                    for (int c = k; c < owned; c++) half[(behind + k) * n + behind + c] += mine[k] * mine[c];
             }
+            V *sum = sums;
+            for (int t = 0; t < panels; t++)
+                for (int u = t; u < panels; u++, sum += HALVES * TILE * TILE)
+                    add_tile(blocks, rows_of[t], joints * TILE, chunk + t * panel, chunk + u * panel, sum);
         }
         double *gram = out + p * n * n;
-        for (int k = 0; k < n; k++)
-            for (int c = k; c < n; c++) {
-                V v = sums[k * n + c], u = sums[(n + k) * n + c];
-                gram[k * n + c] = gram[c * n + k] = ((v[0] + v[1]) + (v[2] + v[3])) + ((u[0] + u[1]) + (u[2] + u[3]));
-            }
+        const V *sum = sums;
+        for (int t = 0; t < panels; t++)
+            for (int u = t; u < panels; u++, sum += HALVES * TILE * TILE)
+                for (int e = 0; e < TILE * TILE; e++) {
+                    int k = TILE * t + e / TILE, c = TILE * u + e % TILE;
+                    V a = sum[e], b = sum[TILE * TILE + e];
+                    if (k < n && c < n)
+                        gram[k * n + c] = gram[c * n + k] =
+                            ((a[0] + a[1]) + (a[2] + a[3])) + ((b[0] + b[1]) + (b[2] + b[3]));
+                }
     }
 }
 

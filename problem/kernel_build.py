@@ -18,6 +18,7 @@ void observation_matrices(int joints, const JointData *data, const double *gravi
 void gram_matrices(int joints, const JointData *data, const double *gravity, int64_t trajectories,
     int64_t samples, const double *q, const double *qd, const double *qdd, int chosen, const int *columns,
     const int *first, int owned, const double *own, double *scratch, double *out);
+int64_t gram_scratch(int joints, int n);
 void torques(int joints, const JointData *data, const double *gravity, int64_t samples, const double *q,
     const double *qd, const double *qdd, const double *parameters, double *out);
 void series(int64_t trajectories, int64_t samples, int joints, int terms, const double *basis,

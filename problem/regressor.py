@@ -5,7 +5,7 @@ takes the z-component in the link's frame instead; with standard D-H frames the 
 """
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -18,7 +18,6 @@ from problem.kernel import ffi, lib, pointer
 from problem.motion import Motion
 
 MAX_JOINTS, MAX_OWNED = 16, 3  # as in kernel.c
-PARTIAL_SUMS = 8  # of each entry of a Gram matrix: LANES * HALVES of kernel.c
 
 
 def observation_matrix(arm: Arm, motion: Motion) -> Array:
@@ -54,7 +53,11 @@ def gram_matrix(arm: Arm, motion: Motion, columns: NDArray[np.intp]) -> Array:
     Each trajectory's result is the same to the bit in any batch. Raises ValueError if joint counts differ or
     a column does not exist.
     """
-    return extended_gram_matrix(arm, motion, columns, np.empty((*motion.position.shape, 0)))
+    joints = _check_joint_count(arm, motion)
+    if arm.coupled:
+        matrix = observation_matrix(arm, motion)[..., columns]
+        return np.asarray(np.swapaxes(matrix, -1, -2) @ matrix)
+    return _sum_products(arm, motion, _layout(columns.tobytes(), columns.dtype.str, joints, 0), ffi.NULL)
 
 
 def extended_gram_matrix(arm: Arm, motion: Motion, columns: NDArray[np.intp], own: Array) -> Array:
@@ -73,22 +76,60 @@ def extended_gram_matrix(arm: Arm, motion: Motion, columns: NDArray[np.intp], ow
         rows[..., np.arange(joints), np.arange(joints), :] = own
         whole = np.concatenate([rigid, rows.reshape(*rigid.shape[:-1], joints * owned)], axis=-1)
         return np.asarray(np.swapaxes(whole, -1, -2) @ whole)
-    size = len(columns) + joints * owned
-    out = np.empty((*motion.batch, size, size))
-    scratch = np.empty(PARTIAL_SUMS * (size**2 + 1))
-    chosen, first = _check_columns(np.asarray(columns, dtype=np.int32).tobytes(), joints)
-    trajectories = math.prod(motion.batch)
+    layout = _layout(columns.tobytes(), columns.dtype.str, joints, owned)
+    entries = np.ascontiguousarray(own, dtype=np.float64)
+    return _sum_products(arm, motion, layout, pointer(entries))
+
+
+@dataclass(frozen=True, eq=False)
+class _Layout:
+    """How the kernel finds the columns of a Gram matrix.
+
+    chosen: columns of the observation matrix, ascending. first: for each joint the first of them that can be non-zero
+    in its rows. owned: further columns of each joint. size: of the Gram matrix. scratch: numbers of memory to sum it.
+    """
+
+    chosen: object
+    first: object
+    count: int
+    owned: int
+    size: int
+    scratch: int
+
+
+@lru_cache(maxsize=64)
+def _layout(columns: bytes, kind: str, joints: int, owned: int) -> _Layout:
+    """Of columns in memory as numbers of a kind of numpy's; raises ValueError if one does not exist."""
+    chosen = np.frombuffer(columns, dtype=kind)
+    if np.any(chosen < 0) or np.any(chosen >= 10 * joints) or np.any(np.diff(chosen) <= 0):
+        raise ValueError(f"columns should be ascending, from 0 to {10 * joints - 1}, not {chosen.tolist()}")
+    first = np.searchsorted(chosen, 10 * np.arange(joints))
+    size = len(chosen) + joints * owned
+    return _Layout(
+        chosen=ffi.new("int[]", chosen.tolist()),
+        first=ffi.new("int[]", first.tolist()),
+        count=len(chosen),
+        owned=owned,
+        size=size,
+        scratch=lib.gram_scratch(joints, size),
+    )
+
+
+def _sum_products(arm: Arm, motion: Motion, layout: _Layout, own: object) -> Array:
+    """The Gram matrices of a motion; own: what the own columns hold, as a C pointer."""
+    out = np.empty((*motion.batch, layout.size, layout.size))
+    scratch = np.empty(layout.scratch)
     lib.gram_matrices(
-        joints,
+        motion.joints,
         *_kernel_data(arm),
-        trajectories,
+        math.prod(motion.batch),
         motion.samples,
         *_motion_pointers(motion),
-        len(chosen),
-        pointer(chosen, "int *"),
-        pointer(first, "int *"),
-        owned,
-        pointer(np.ascontiguousarray(own, dtype=np.float64)),
+        layout.count,
+        layout.chosen,
+        layout.first,
+        layout.owned,
+        own,
         pointer(scratch),
         pointer(out),
     )
@@ -140,15 +181,6 @@ def inertia_column(arm: Arm, position: Array, joint: int, parameters: Array | No
     still, push = np.zeros(position.shape), np.zeros(position.shape)
     push[:, joint] = 1.0
     return rigid_body_torque(replace(arm, gravity=(0.0, 0.0, 0.0)), Motion(position, still, push), parameters)
-
-
-@lru_cache(maxsize=64)
-def _check_columns(columns: bytes, joints: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """The columns, checked, and for each joint the first of them that can be non-zero in its rows."""
-    chosen = np.frombuffer(columns, dtype=np.int32)
-    if np.any(chosen < 0) or np.any(chosen >= 10 * joints) or np.any(np.diff(chosen) <= 0):
-        raise ValueError(f"columns should be ascending, from 0 to {10 * joints - 1}, not {chosen.tolist()}")
-    return chosen, np.searchsorted(chosen, 10 * np.arange(joints)).astype(np.int32)
 
 
 def _check_joint_count(arm: Arm, motion: Motion) -> int:

@@ -21,7 +21,8 @@ from armlab.common.errors import InputError, in_one_line
 
 State = Literal["ok", "missing", "broken"]
 KERNELS = {
-    "problem._kernel": "condition numbers",
+    "problem._kernel": "observation matrices",
+    "problem._spectra": "condition numbers",
     "armlab.effects._drive_train": "play and springs of drive trains",
     "armlab.diagnosis.motion._joint_replay": "replay of position servos",
     "armlab.proof.blind.servo._servo_arm": "simulated servos of the proof",

@@ -13,12 +13,12 @@ from refusals import refusal
 from armlab.common.arrays import Array
 from armlab.common.derivatives import Question
 from problem.excitation import ExcitationProblem
-from problem.fitness import MAX_GRAM_CONDITION, condition_number, singular_values
 from problem.friction import friction_entries, friction_matrix
 from problem.gradient import condition_gradient, motion_of
 from problem.motion import MAX_RATE_AT_REST, Motion
 from problem.registry import parse_problem
 from problem.regressor import extended_gram_matrix, observation_matrix
+from problem.spectrum import MAX_GRAM_CONDITION, find_spectrum
 
 SMALL = {"preset": "joint-fourier", "arm": "irb120", "harmonics": 3, "samples": 40, "friction_columns": True}
 
@@ -120,7 +120,7 @@ def test_a_nearly_singular_motion_is_judged_by_the_matrix_itself(unit_columns: b
     matrix = stacked(problem, steady.select(np.intp(0)))
     if unit_columns:
         matrix = matrix / np.linalg.norm(matrix, axis=0)
-    condition = condition_number(singular_values(problem.arm, steady, problem.base.columns, unit_columns, True))[0]
+    condition = find_spectrum(problem.arm, steady, problem.base.columns, unit_columns, True).condition_number[0]
     assert condition > MAX_GRAM_CONDITION
     assert condition == pytest.approx(np.linalg.cond(matrix), rel=1e-6)
 
@@ -128,9 +128,8 @@ def test_a_nearly_singular_motion_is_judged_by_the_matrix_itself(unit_columns: b
 def test_a_joint_that_never_turns_back_does_not_tell_coulomb_friction_from_an_offset() -> None:
     problem, motion = build(arm="irb120-arm"), random_motion(3, 60, batch=(1,))
     forward = Motion(motion.position, np.abs(motion.velocity), motion.acceleration)
-    values = singular_values(problem.arm, forward, problem.base.columns, True, True)
-    assert condition_number(values)[0] > 1e12
-    assert condition_number(singular_values(problem.arm, motion, problem.base.columns, True, True))[0] < 1e3
+    assert find_spectrum(problem.arm, forward, problem.base.columns, True, True).condition_number[0] > 1e12
+    assert find_spectrum(problem.arm, motion, problem.base.columns, True, True).condition_number[0] < 1e3
 
 
 STEP = 1e-7  # of the differences; the signs of all speeds are the same on both sides

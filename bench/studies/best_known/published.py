@@ -16,7 +16,6 @@ from armlab.common.settings import Settings, read_yaml, validate
 from bench.studies.best_known.records import build_excitation, known_values, read_search_plan
 from bench.studies.best_known.search import CONFIG_FILE as PLAN_FILE
 from problem.excitation import ExcitationProblem
-from problem.fitness import condition_number
 from problem.limits import peaks
 from problem.motion import Motion
 from problem.registry import parse_problem
@@ -136,12 +135,11 @@ def _judge(
     if len(trajectory.sines) != len(problem.arm):
         raise InputError(f"{name}: has {len(trajectory.sines)} joints, '{problem.arm.name}' has {len(problem.arm)}")
     motion = trajectory.motion(problem.samples)
-    values = problem.singular_values(motion)
     return Judgement(
         name=name,
         columns=columns,
         problem=trajectory.problems[columns],
-        value=float(condition_number(values)[0]),
+        value=float(problem.spectrum(motion).condition_number[0]),
         best=known[trajectory.problems[columns]],
         same_family=known[trajectory.same_family[columns]],
         limit_use=_limit_use(problem, trajectory.motion(LIMIT_SAMPLES)),

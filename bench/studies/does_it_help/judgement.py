@@ -14,8 +14,9 @@ from armlab.common.streams import named_generator
 from bench.studies.does_it_help.identification import NOISE_KINDS, identification_errors
 from bench.studies.does_it_help.trajectories import Specimen, random_feasible
 from problem.excitation import ExcitationProblem
-from problem.fitness import Criterion, condition_number, singular_values
+from problem.fitness import Criterion
 from problem.regressor import observation_matrix
+from problem.spectrum import find_spectrum
 
 CRITERIA = ("cond", "cond_unit_columns", "d_optimality", "e_optimality", "eq44")  # the smaller, the better
 ERRORS = ("prediction", "parameters", "parameters_si")
@@ -78,11 +79,11 @@ def judge_specimen(specimen: Specimen, panel: Jury, seed: int, repetitions: int)
 def criterion_values(problem: ExcitationProblem, point: Array) -> dict[str, float]:
     """Every criterion of a point (dimension,)."""
     motion = problem.trajectory.motions(point[None], problem.times).motion
-    plain = singular_values(problem.arm, motion, problem.base.columns, False)
-    unit = singular_values(problem.arm, motion, problem.base.columns, True)
+    plain = find_spectrum(problem.arm, motion, problem.base.columns, False)
+    unit = find_spectrum(problem.arm, motion, problem.base.columns, True)
     values = (
-        condition_number(plain),
-        condition_number(unit),
+        plain.condition_number,
+        unit.condition_number,
         Criterion("d_optimality").value(plain),
         Criterion("e_optimality").value(plain),
         Criterion("eq44", EQ44_WEIGHT, EQ44_WEIGHT).value(plain),

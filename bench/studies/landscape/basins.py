@@ -21,7 +21,6 @@ from armlab.common.arrays import Array
 from armlab.common.derivatives import Derivatives, Question
 from armlab.common.streams import named_generator
 from problem.excitation import ExcitationProblem
-from problem.fitness import condition_number
 from problem.motion import Motion
 from problem.trajectories import JointFourier, sample_instants
 
@@ -134,7 +133,7 @@ def find_symmetry(problem: ExcitationProblem, points: Array) -> Symmetry:
 
 
 def _condition(problem: ExcitationProblem, motion: Motion) -> Array:
-    return condition_number(problem.singular_values(motion))
+    return problem.spectrum(motion).condition_number
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,6 @@ import numpy as np
 from armlab.common.arrays import Array
 from bench.printed import PrintedOptimum
 from problem.excitation import ExcitationProblem
-from problem.fitness import condition_number
 from problem.motion import Motion
 from problem.presets import PaperSettings
 from problem.trajectories import CartesianFourier
@@ -72,5 +71,4 @@ def _evaluate_reading(point: Array, space: Literal["Cartesian", "joint"], settin
 
 
 def _condition_number(problem: ExcitationProblem, motion: Motion) -> float:
-    values = problem.singular_values(motion)
-    return float(condition_number(values)[0])
+    return float(problem.spectrum(motion).condition_number[0])

@@ -109,9 +109,9 @@ def _replace_regressor(matrix: Matrix, gram: Gram) -> Injection:
     @contextmanager
     def inject() -> Iterator[None]:
         with ExitStack() as stack:
-            for place in ("problem.fitness.observation_matrix", "problem.base_parameters.observation_matrix"):
+            for place in ("problem.spectrum.observation_matrix", "problem.base_parameters.observation_matrix"):
                 stack.enter_context(patch(place, matrix))
-            stack.enter_context(patch("problem.fitness.gram_matrix", gram))
+            stack.enter_context(patch("problem.spectrum.gram_matrix", gram))
             stack.enter_context(patch("bench.execute.build_problem", lru_cache(_build_problem)))
             yield
 

@@ -18,10 +18,10 @@ from bench.studies.speed.clock import median_seconds
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
 from problem.contract import DifferentiableProblem, Problem
-from problem.fitness import condition_number, singular_values
 from problem.motion import Motion
 from problem.registry import parse_problem
 from problem.robot_file import load_arm
+from problem.spectrum import find_spectrum
 
 POPULATION_SIZE = 50
 PIPELINE_SAMPLES = 100
@@ -70,7 +70,7 @@ def compare_pipelines(arm_name: str, rounds: int = PIPELINE_ROUNDS) -> PipelineF
         return lambda: np.concatenate([condition(single) for single in singles])
 
     def of_armlab(some: Motion) -> Array:
-        return condition_number(singular_values(arm, some, columns, unit_columns=False))
+        return find_spectrum(arm, some, columns, unit_columns=False).condition_number
 
     tasks: dict[str, Callable[[], Array]] = {
         "armlab, population of 50": lambda: of_armlab(motion),
@@ -232,4 +232,4 @@ def _evaluation_task(problem: Problem, points: int) -> Callable[[], object]:
 def _condition_task(arm_name: str, samples: int) -> Callable[[], object]:
     arm = load_arm(arm_name)
     motion, columns = random_motions(arm, 50, samples), base_parameters(arm).columns
-    return lambda: singular_values(arm, motion, columns, unit_columns=False)
+    return lambda: find_spectrum(arm, motion, columns, unit_columns=False)

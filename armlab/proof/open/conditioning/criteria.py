@@ -4,7 +4,8 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.identification.estimators.least_squares import RANK_TOLERANCE, column_lengths
-from problem.fitness import Criterion, condition_number
+from problem.fitness import Criterion
+from problem.spectrum import Spectrum
 
 SPECTRAL_CRITERIA = ("cond", "d_optimality", "e_optimality")
 SCALINGS = ("si", "unit")  # of the columns: SI units; unit length in the window
@@ -44,10 +45,10 @@ def prediction_criterion(triangle: Array, judged: Array) -> float:
 
 
 def _spectral_criteria(matrix: Array) -> dict[str, float]:
-    sizes: Array = np.asarray(np.linalg.svd(matrix, compute_uv=False)[None], dtype=np.float64)
+    spectrum = Spectrum.of(np.asarray(np.linalg.svd(matrix, compute_uv=False)[None], dtype=np.float64))
     values = (
-        condition_number(sizes),
-        Criterion("d_optimality").value(sizes),
-        Criterion("e_optimality").value(sizes),
+        spectrum.condition_number,
+        Criterion("d_optimality").value(spectrum),
+        Criterion("e_optimality").value(spectrum),
     )
     return {name: float(value[0]) for name, value in zip(SPECTRAL_CRITERIA, values, strict=True)}

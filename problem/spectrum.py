@@ -1,0 +1,108 @@
+"""Both ends of the spectrum of an observation matrix.
+
+They come from the Gram matrix where that is accurate, by `spectra.c` for four trajectories at once, else from the
+matrix itself.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armlab.common.arrays import Array
+from problem._spectra import lib
+from problem.arm import Arm
+from problem.friction import friction_entries, friction_matrix
+from problem.kernel import pointer
+from problem.motion import Motion
+from problem.regressor import extended_gram_matrix, gram_matrix, observation_matrix
+
+MAX_GRAM_CONDITION = 1e4
+"""Largest condition number taken from the Gram matrix: its square loses 2e-16 * cond^2 of relative accuracy,
+here at most 1e-7; beyond it the singular values come from the observation matrix itself."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """What is asked of the singular values of some matrices, (points,) each.
+
+    smallest, largest: of each matrix. mean_logarithm: the mean of the logarithms of all, minus infinity at rank loss.
+    """
+
+    smallest: Array
+    largest: Array
+    mean_logarithm: Array
+
+    @classmethod
+    def of(cls, singular_values: Array) -> Self:
+        """The spectrum of singular values (points, n), descending."""
+        with np.errstate(divide="ignore"):
+            return cls(singular_values[:, -1], singular_values[:, 0], np.log(singular_values).mean(axis=1))
+
+    @cached_property
+    def condition_number(self) -> Array:
+        """Ratio of the largest to the smallest, (points,); infinite at rank loss."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio: Array = self.largest / self.smallest
+        ratio[self.smallest == 0] = np.inf
+        return ratio
+
+
+def find_spectrum(
+    arm: Arm, motion: Motion, columns: NDArray[np.intp], unit_columns: bool, friction_columns: bool = False
+) -> Spectrum:
+    """The spectrum of chosen columns of the observation matrix of each trajectory.
+
+    motion: (points, samples, joints). unit_columns: scale each column to unit length first. friction_columns: with
+    those of `problem.friction` behind the chosen ones, three more a joint.
+    Taken from the Gram matrix where that is accurate (see MAX_GRAM_CONDITION), else from the matrix itself; zeros for a
+    motion that is not finite.
+    """
+    if friction_columns:
+        gram = extended_gram_matrix(arm, motion, columns, friction_entries(motion))
+    else:
+        gram = gram_matrix(arm, motion, columns)
+    if unit_columns:
+        lengths = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))
+        lengths = np.where(lengths > 0, lengths, 1.0)
+        gram = gram / (lengths[:, :, None] * lengths[:, None, :])
+    found = spectra_of_gram_matrices(gram)
+    accurate = found[1] <= MAX_GRAM_CONDITION * found[0]
+    if not accurate.all():
+        for point in np.flatnonzero(~accurate):
+            values = np.zeros(gram.shape[-1])
+            if np.isfinite(gram[point]).all():
+                values = _singular_values(arm, motion.select(point), columns, unit_columns, friction_columns)
+            exact = Spectrum.of(values[None])
+            found[:, point] = exact.smallest[0], exact.largest[0], exact.mean_logarithm[0]
+    return Spectrum(*found)
+
+
+def spectra_of_gram_matrices(gram: Array) -> Array:
+    """Smallest and largest singular value of matrices, and the mean of the logarithms of all: (3, points).
+
+    gram: (points, n, n), W' W of each matrix W. Not a number where a Gram matrix is not positive definite, or too
+    little for its rounding errors.
+    """
+    points, size, _ = gram.shape
+    scratch, out = np.empty(_LANES * (size**2 + 1)), np.empty((points, 3))
+    lib.spectra(points, size, pointer(gram), pointer(scratch), pointer(out))
+    return out.T
+
+
+_LANES = 4  # as in spectra.c
+
+
+def _singular_values(
+    arm: Arm, motion: Motion, columns: NDArray[np.intp], unit_columns: bool, friction_columns: bool
+) -> Array:
+    """Singular values (n,), descending, of the matrix of one trajectory."""
+    matrix = observation_matrix(arm, motion)[:, columns]
+    if friction_columns:
+        matrix = np.hstack([matrix, friction_matrix(motion)])
+    if unit_columns:
+        lengths = np.linalg.norm(matrix, axis=0)
+        matrix = matrix / np.where(lengths > 0, lengths, 1.0)
+    return np.asarray(np.linalg.svd(matrix, compute_uv=False))
