@@ -29,7 +29,5 @@ class Criterion:
         if self.kind == "d_optimality":
             return -2.0 * spectrum.mean_logarithm
         with np.errstate(divide="ignore", invalid="ignore"):  # 0 / 0 where a weight is 0 too
-            weighted = self.weight_smallest / spectrum.smallest + self.weight_largest * spectrum.largest
-            merit = spectrum.condition_number + weighted
-        merit[spectrum.smallest == 0] = np.inf
-        return merit
+            merit = self.weight_smallest / spectrum.smallest + self.weight_largest * spectrum.largest
+        return np.where(spectrum.smallest > 0, spectrum.condition_number + merit, np.inf)

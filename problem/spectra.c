@@ -141,11 +141,12 @@ INLINE I multiply_pivots(int n, const V *diagonal, const V *beside, V *mantissa,
     return positive;
 }
 
-/* Smallest and largest singular value, and the mean of the logarithms of all, (count, 3), of matrices whose Gram matrices
- * are given, (count, n, n). Not a number where a Gram matrix is not positive definite, or too little for its rounding
- * errors. scratch: n * n + 1 vectors. */
+/* Smallest and largest singular value, their ratio, and the mean of the logarithms of all, (4, count), of matrices whose
+ * Gram matrices are given, (count, n, n). Not a number where a Gram matrix is not positive definite, or where the ratio
+ * is above max_condition; returns how many these are. scratch: n * n + 1 vectors. */
 FOR_EACH_PROCESSOR
-void spectra(int64_t count, int n, const double *grams, double *scratch, double *out) {
+int64_t spectra(int64_t count, int n, const double *grams, double max_condition, double *scratch, double *out) {
+    int64_t unknown = 0;
     V *a = (V *)(((uintptr_t)scratch + sizeof(V) - 1) & ~(uintptr_t)(sizeof(V) - 1));
     V minus_diagonals[ENDS][MAX_SIZE], beside[MAX_SIZE];
     V *diagonal = minus_diagonals[1], zero = {0};
@@ -167,13 +168,17 @@ void spectra(int64_t count, int n, const double *grams, double *scratch, double 
         I exponent;
         I known = multiply_pivots(n, diagonal, beside, &mantissa, &exponent);
         known &= find_last_eigenvalues(n, minus_diagonals, beside, last);
-        V largest = root(last[0] / scale), smallest = root(-last[1] / scale);
+        V largest = root(last[0] / scale), smallest = root(-last[1] / scale), condition = largest / smallest;
+        known &= condition <= max_condition;
         for (int l = 0; l < LANES && from + l < count; l++) {
-            double *found = out + 3 * (from + l);
+            double *found = out + from + l;
             double logarithm = (log(mantissa[l]) + (double)exponent[l] * M_LN2) / n - log(scale[l]);
             found[0] = known[l] ? smallest[l] : NAN;
-            found[1] = known[l] ? largest[l] : NAN;
-            found[2] = known[l] ? 0.5 * logarithm : NAN;
+            found[count] = known[l] ? largest[l] : NAN;
+            found[2 * count] = known[l] ? condition[l] : NAN;
+            found[3 * count] = known[l] ? 0.5 * logarithm : NAN;
+            unknown += !known[l];
         }
     }
+    return unknown;
 }

@@ -5,7 +5,11 @@ from pathlib import Path
 import cffi
 
 ffibuilder = cffi.FFI()
-ffibuilder.cdef("void spectra(int64_t count, int n, const double *grams, double *scratch, double *out);")
+ffibuilder.cdef(
+    """
+int64_t spectra(int64_t count, int n, const double *grams, double max_condition, double *scratch, double *out);
+"""
+)
 ffibuilder.set_source(
     "problem._spectra",
     Path(__file__).with_name("spectra.c").read_text(),

@@ -4,9 +4,7 @@ They come from the Gram matrix where that is accurate, by `spectra.c` for four t
 matrix itself.
 """
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,30 +22,25 @@ MAX_GRAM_CONDITION = 1e4
 here at most 1e-7; beyond it the singular values come from the observation matrix itself."""
 
 
-@dataclass(frozen=True, eq=False)
-class Spectrum:
+class Spectrum(NamedTuple):
     """What is asked of the singular values of some matrices, (points,) each.
 
-    smallest, largest: of each matrix. mean_logarithm: the mean of the logarithms of all, minus infinity at rank loss.
+    smallest, largest: of each matrix. condition_number: their ratio, infinite at rank loss. mean_logarithm: the mean of
+    the logarithms of all, minus infinity at rank loss.
     """
 
     smallest: Array
     largest: Array
+    condition_number: Array
     mean_logarithm: Array
 
     @classmethod
     def of(cls, singular_values: Array) -> Self:
         """The spectrum of singular values (points, n), descending."""
-        with np.errstate(divide="ignore"):
-            return cls(singular_values[:, -1], singular_values[:, 0], np.log(singular_values).mean(axis=1))
-
-    @cached_property
-    def condition_number(self) -> Array:
-        """Ratio of the largest to the smallest, (points,); infinite at rank loss."""
+        largest, smallest = singular_values[:, 0], singular_values[:, -1]
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratio: Array = self.largest / self.smallest
-        ratio[self.smallest == 0] = np.inf
-        return ratio
+            ratio = np.where(smallest > 0, largest / smallest, np.inf)
+            return cls(smallest, largest, ratio, np.log(singular_values).mean(axis=1))
 
 
 def find_spectrum(
@@ -68,28 +61,27 @@ def find_spectrum(
         lengths = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))
         lengths = np.where(lengths > 0, lengths, 1.0)
         gram = gram / (lengths[:, :, None] * lengths[:, None, :])
-    found = spectra_of_gram_matrices(gram)
-    accurate = found[1] <= MAX_GRAM_CONDITION * found[0]
-    if not accurate.all():
-        for point in np.flatnonzero(~accurate):
+    found, unknown = spectra_of_gram_matrices(gram)
+    if unknown:
+        for point in np.flatnonzero(np.isnan(found.smallest)):
             values = np.zeros(gram.shape[-1])
             if np.isfinite(gram[point]).all():
                 values = _singular_values(arm, motion.select(point), columns, unit_columns, friction_columns)
-            exact = Spectrum.of(values[None])
-            found[:, point] = exact.smallest[0], exact.largest[0], exact.mean_logarithm[0]
-    return Spectrum(*found)
+            for entries, entry in zip(found, Spectrum.of(values[None]), strict=True):
+                entries[point] = entry[0]
+    return found
 
 
-def spectra_of_gram_matrices(gram: Array) -> Array:
-    """Smallest and largest singular value of matrices, and the mean of the logarithms of all: (3, points).
+def spectra_of_gram_matrices(gram: Array) -> tuple[Spectrum, int]:
+    """The spectra of matrices W whose Gram matrices W' W are given, (points, n, n), and how many are not known.
 
-    gram: (points, n, n), W' W of each matrix W. Not a number where a Gram matrix is not positive definite, or too
-    little for its rounding errors.
+    These are not numbers: where a Gram matrix is not positive definite, or the condition number above
+    MAX_GRAM_CONDITION.
     """
     points, size, _ = gram.shape
-    scratch, out = np.empty(_LANES * (size**2 + 1)), np.empty((points, 3))
-    lib.spectra(points, size, pointer(gram), pointer(scratch), pointer(out))
-    return out.T
+    scratch, out = np.empty(_LANES * (size**2 + 1)), np.empty((4, points))
+    unknown = lib.spectra(points, size, pointer(gram), MAX_GRAM_CONDITION, pointer(scratch), pointer(out))
+    return Spectrum(out[0], out[1], out[2], out[3]), unknown
 
 
 _LANES = 4  # as in spectra.c
