@@ -68,7 +68,7 @@ def _check_rest_at_ends(motion: Motion, name: str) -> None:
 def _describe_worst_violation(constraints: Constraints, motion: Motion) -> str:
     """The most exceeded limit of joint motion, relative to its size."""
     told: dict[str, float] = {}
-    for joint, limits, peak in zip(constraints.arm.joints, constraints.limits, peaks(motion)[0], strict=True):
+    for joint, limits, peak in zip(constraints.arm.joints, constraints.limits, peaks(motion)[0].T, strict=True):
         low, high, speed, acceleration = (float(value) for value in peak)
         entries = [
             ("position", low, limits.position[0], limits.position[0] - low),

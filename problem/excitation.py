@@ -121,8 +121,11 @@ class ExcitationProblem:
         excitation = self.trajectory.motions(np.ascontiguousarray(points, dtype=np.float64), self.times)
         violation = self.constraints.violation(excitation)
         reached = excitation.overreach == 0
-        merit, value = np.zeros(len(points)), np.full(len(points), np.inf)
-        merit[reached], value[reached] = self._judge(excitation.motion.select(reached))
+        if reached.all():
+            merit, value = self._judge(excitation.motion)
+        else:
+            merit, value = np.zeros(len(points)), np.full(len(points), np.inf)
+            merit[reached], value[reached] = self._judge(excitation.motion.select(reached))
         return Evaluation(self.penalty.fitness(merit, violation), value, violation)
 
     def _judge(self, motion: Motion) -> tuple[Array, Array]:

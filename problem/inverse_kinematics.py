@@ -54,12 +54,12 @@ class PlanarArm:
         first = (_unwrap_angles(turn[0] - self.azimuth), turn[1], turn[2])
         second = (_wrap_angles(self.upper_angle - upper[0]), -upper[1], -upper[2])
         third = (_wrap_angles(self.fore_angle - self.upper_angle - elbow[0]), -elbow[1], -elbow[2])
-        motion = Motion(
-            position=np.stack([first[0], second[0], third[0]], axis=-1),
-            velocity=np.stack([first[1], second[1], third[1]], axis=-1),
-            acceleration=np.stack([first[2], second[2], third[2]], axis=-1),
-        )
-        return motion, overreach
+        states = np.empty((3, *turn[0].shape, 3))
+        for joint, parts in enumerate((first, second, third)):
+            for state, part in zip(states, parts, strict=True):
+                state[..., joint] = part
+        position, velocity, acceleration = states
+        return Motion(position, velocity, acceleration), overreach
 
     def _planar(
         self, radial: tuple[Array, ...], height: tuple[Array, ...], side: float
@@ -71,7 +71,7 @@ class PlanarArm:
         half_rate = x * dx + z * dz
         half_bend = dx * dx + dz * dz + x * ddx + z * ddz
         scale = 1.0 / (upper * fore)
-        cosine = np.clip((square - upper**2 - fore**2) * (0.5 * scale), -1.0, 1.0)
+        cosine = np.minimum(np.maximum((square - upper**2 - fore**2) * (0.5 * scale), -1.0), 1.0)
         sine = side * np.maximum(np.sqrt(1.0 - cosine * cosine), MIN_SINE)
         elbow = side * np.arccos(cosine)
         elbow_rate = -half_rate * scale / sine
@@ -158,5 +158,7 @@ def _wrap_angles(angle: Array) -> Array:
 
 def _unwrap_angles(angle: Array) -> Array:
     """Angles without jumps of a turn along the samples, the first in [-pi, pi)."""
-    jumps = np.diff(angle, axis=-1, prepend=_wrap_angles(angle[..., :1]))
+    jumps = np.empty(angle.shape)
+    jumps[..., 0] = angle[..., 0] - _wrap_angles(angle[..., 0])
+    jumps[..., 1:] = angle[..., 1:] - angle[..., :-1]
     return angle - 2 * np.pi * np.cumsum(np.floor(jumps / (2 * np.pi) + 0.5), axis=-1)

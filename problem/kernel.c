@@ -226,16 +226,16 @@ INLINE void torques_of_samples(int joints, const JointData *data, const double *
     }
 }
 
-/* Some samples of one trajectory, (samples, joints) in memory, as one vector a joint; missing ones are 0. */
-INLINE void load(int joints, int count, const double *from, V *to) {
+/* Some samples of one trajectory as one vector a joint; stride: from sample to sample in memory; missing ones are 0. */
+INLINE void load(int joints, int count, int64_t stride, const double *from, V *to) {
     if (count == LANES) {
-        const double *a = from, *b = a + joints, *c = b + joints, *d = c + joints;
+        const double *a = from, *b = a + stride, *c = b + stride, *d = c + stride;
         for (int j = 0; j < joints; j++) to[j] = (V){a[j], b[j], c[j], d[j]};
         return;
     }
     for (int j = 0; j < joints; j++) {
         V lanes = {0};
-        for (int l = 0; l < count; l++) lanes[l] = from[l * joints + j];
+        for (int l = 0; l < count; l++) lanes[l] = from[l * stride + j];
         to[j] = lanes;
     }
 }
@@ -250,9 +250,9 @@ void observation_matrices(int joints, const JointData *data, const double *gravi
     int width = 10 * joints;
     for (int64_t s = 0; s < samples; s += LANES) {
         int count = at_most_lanes(samples - s);
-        load(joints, count, q + s * joints, vq);
-        load(joints, count, qd + s * joints, vqd);
-        load(joints, count, qdd + s * joints, vqdd);
+        load(joints, count, joints, q + s * joints, vq);
+        load(joints, count, joints, qd + s * joints, vqd);
+        load(joints, count, joints, qdd + s * joints, vqdd);
         rows_of_samples(joints, data, gravity, vq, vqd, vqdd, rows);
         for (int l = 0; l < count; l++)
             for (int i = 0; i < joints; i++) {
@@ -324,10 +324,10 @@ void gram_matrices(int joints, const JointData *data, const double *gravity, int
             for (int64_t s = from; s < samples && blocks < CHUNK; s += LANES, blocks++) {
                 int64_t at = (p * samples + s) * joints;
                 int count = at_most_lanes(samples - s);
-                load(joints, count, q + at, vq);
-                load(joints, count, qd + at, vqd);
-                load(joints, count, qdd + at, vqdd);
-                load(joints * owned, count, own + at * owned, vown);
+                load(joints, count, joints, q + at, vq);
+                load(joints, count, joints, qd + at, vqd);
+                load(joints, count, joints, qdd + at, vqdd);
+                load(joints * owned, count, joints * owned, own + at * owned, vown);
                 rows_of_samples(joints, data, gravity, vq, vqd, vqdd, rows);
                 V present;
                 for (int l = 0; l < LANES; l++) present[l] = l < count;
@@ -367,28 +367,34 @@ void torques(int joints, const JointData *data, const double *gravity, int64_t s
     V vq[MAX_JOINTS], vqd[MAX_JOINTS], vqdd[MAX_JOINTS], torque[MAX_JOINTS];
     for (int64_t s = 0; s < samples; s += LANES) {
         int count = at_most_lanes(samples - s);
-        load(joints, count, q + s * joints, vq);
-        load(joints, count, qd + s * joints, vqd);
-        load(joints, count, qdd + s * joints, vqdd);
+        load(joints, count, joints, q + s * joints, vq);
+        load(joints, count, joints, qd + s * joints, vqd);
+        load(joints, count, joints, qdd + s * joints, vqdd);
         torques_of_samples(joints, data, gravity, vq, vqd, vqdd, parameters, torque);
         for (int i = 0; i < joints; i++)
             for (int l = 0; l < count; l++) out[(s + l) * joints + i] = torque[i][l];
     }
 }
 
-/* Sums of basis functions: out (trajectories, samples, joints) = sum over k of
- * basis (samples, terms) * coefficients (trajectories, joints, terms). */
+/* Sums of basis functions: out (orders, trajectories, samples, joints) = sum over k of
+ * basis (orders, samples, terms) * coefficients (trajectories, joints, terms). */
 FOR_EACH_PROCESSOR
-void series(int64_t trajectories, int64_t samples, int joints, int terms, const double *basis,
+void series(int orders, int64_t trajectories, int64_t samples, int joints, int terms, const double *basis,
             const double *coefficients, double *out) {
-    for (int64_t p = 0; p < trajectories; p++)
-        for (int64_t s = 0; s < samples; s++)
-            for (int j = 0; j < joints; j++) {
-                const double *c = coefficients + (p * joints + j) * terms, *b = basis + s * terms;
-                double sum = 0;
-                for (int k = 0; k < terms; k++) sum += b[k] * c[k];
-                out[(p * samples + s) * joints + j] = sum;
+    for (int order = 0; order < orders; order++, basis += samples * terms)
+        for (int64_t p = 0; p < trajectories; p++, out += samples * joints) {
+            const double *own = coefficients + p * joints * terms;
+            for (int64_t s = 0; s < samples; s += LANES) {
+                int count = at_most_lanes(samples - s);
+                V sums[MAX_JOINTS] = {{0}}, value;
+                for (int k = 0; k < terms; k++) {
+                    load(1, count, terms, basis + s * terms + k, &value);
+                    for (int j = 0; j < joints; j++) sums[j] += value * own[j * terms + k];
+                }
+                for (int l = 0; l < count; l++)
+                    for (int j = 0; j < joints; j++) out[(s + l) * joints + j] = sums[j][l];
             }
+        }
 }
 
 INLINE V blend(I where, V chosen, V other) { return (V)(((I)chosen & where) | ((I)other & ~where)); }
@@ -420,7 +426,7 @@ void series_extremes(int64_t trajectories, int64_t samples, int joints, int term
 }
 
 /* Peaks of each joint of each trajectory: lowest and highest position, largest speed and acceleration;
- * (trajectories, joints, 4). */
+ * (trajectories, 4, joints). */
 FOR_EACH_PROCESSOR
 void peaks(int64_t trajectories, int64_t samples, int joints, const double *q, const double *qd, const double *qdd,
            double *out) {
@@ -435,7 +441,7 @@ void peaks(int64_t trajectories, int64_t samples, int joints, const double *q, c
                 speed = v > speed ? v : speed;
                 acceleration = a > acceleration ? a : acceleration;
             }
-            double *peak = out + (p * joints + j) * 4;
-            peak[0] = low, peak[1] = high, peak[2] = speed, peak[3] = acceleration;
+            double *peak = out + p * 4 * joints + j;
+            peak[0] = low, peak[joints] = high, peak[2 * joints] = speed, peak[3 * joints] = acceleration;
         }
 }

@@ -1,6 +1,7 @@
 """Limits of the arm and of its workspace, and how far a motion exceeds them."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -59,38 +60,62 @@ class Constraints:
         whose joint motion means nothing, only the overreach counts, and it counts more than any limit.
         Infinite for a motion that is not finite.
         """
-        within_reach = np.log1p(self._excesses(excitation.motion)).sum(axis=-1)
-        out_of_reach = 1e3 * (1.0 + excitation.overreach)
-        violation = np.where(excitation.overreach > 0, out_of_reach, within_reach)
-        return np.where(np.isnan(violation), np.inf, violation)
+        violation: Array = np.log1p(self._excesses(excitation.motion)).sum(axis=-1)
+        violation[np.isnan(violation)] = np.inf
+        beyond = excitation.overreach > 0
+        violation[beyond] = 1e3 * (1.0 + excitation.overreach[beyond])
+        return violation
 
     def _excesses(self, motion: Motion) -> Array:
         """Relative excess of each limit, (points, limits)."""
-        lowest, highest, speed, acceleration = np.moveaxis(peaks(motion), -1, 0)
-        low, high = np.array([limit.position for limit in self.limits]).T
-        half_range = np.where(np.isfinite(high - low), (high - low) / 2, 1.0)
-        columns = [
-            (low - lowest) / half_range,
-            (highest - high) / half_range,
-            speed / [limit.velocity for limit in self.limits] - 1.0,
-            acceleration / [limit.acceleration for limit in self.limits] - 1.0,
-        ]
-        torque_limit = np.array([limit.torque for limit in self.limits])
-        if np.any(np.isfinite(torque_limit)):
-            columns.append(np.abs(drive_torque(self.arm, motion)).max(axis=1) / torque_limit - 1.0)
+        found, numbers = peaks(motion), self._numbers
+        points, _, joints = found.shape
+        excesses = np.empty((points, 4 * joints))
+        by_kind = excesses.reshape(points, 4, joints)
+        np.subtract(numbers.low, found[:, 0], out=by_kind[:, 0])
+        np.subtract(found[:, 1], numbers.high, out=by_kind[:, 1])
+        by_kind[:, :2] /= numbers.half_range
+        np.divide(found[:, 2:], numbers.rates, out=by_kind[:, 2:])
+        by_kind[:, 2:] -= 1.0
+        if numbers.torque is not None:
+            shares = np.abs(drive_torque(self.arm, motion)).max(axis=1) / numbers.torque
+            excesses = np.concatenate([excesses, shares - 1.0], axis=1)
         if self.workspace.limited:
-            points = body_points(self.arm, motion.position, np.array(self.workspace.tool))
-            columns.append(self.workspace.excess(points)[:, None])
-        return np.asarray(np.maximum(np.concatenate(columns, axis=1), 0.0))
+            places = body_points(self.arm, motion.position, np.array(self.workspace.tool))
+            excesses = np.concatenate([excesses, self.workspace.excess(places)[:, None]], axis=1)
+        return np.maximum(excesses, 0.0)
+
+    @cached_property
+    def _numbers(self) -> "_LimitNumbers":
+        low, high = np.array([limit.position for limit in self.limits]).T
+        torque = np.array([limit.torque for limit in self.limits])
+        return _LimitNumbers(
+            low=low,
+            high=high,
+            half_range=np.where(np.isfinite(high - low), (high - low) / 2, 1.0),
+            rates=np.array([[limit.velocity, limit.acceleration] for limit in self.limits]).T,
+            torque=torque if np.any(np.isfinite(torque)) else None,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _LimitNumbers:
+    """Limits as arrays: low, high, half_range, torque (joints,), rates (2, joints); no torque where none is limited."""
+
+    low: Array
+    high: Array
+    half_range: Array
+    rates: Array
+    torque: Array | None
 
 
 def peaks(motion: Motion) -> Array:
-    """Lowest and highest position, largest speed and acceleration, (points, joints, 4).
+    """Lowest and highest position, largest speed and acceleration, (points, 4, joints).
 
     motion: (points, samples, joints).
     """
     points, samples, joints = motion.position.shape
-    out = np.empty((points, joints, 4))
+    out = np.empty((points, 4, joints))
     position, velocity, acceleration = pointer(motion.position), pointer(motion.velocity), pointer(motion.acceleration)
     lib.peaks(points, samples, joints, position, velocity, acceleration, pointer(out))
     return out

@@ -59,13 +59,15 @@ def sample_instants(duration: float, samples: int) -> Array:
 def series(basis: Array, coefficients: Array) -> Array:
     """Sums of basis functions, the same to the bit in any batch.
 
-    basis: (samples, terms); coefficients: (points, joints, terms). Returns (points, samples, joints).
+    basis: (orders, samples, terms), functions and their derivatives; coefficients: (points, joints, terms), of up to
+    MAX_JOINTS. Returns (orders, points, samples, joints).
     """
     basis = np.ascontiguousarray(basis)
     coefficients = np.ascontiguousarray(coefficients)
     points, joints, terms = coefficients.shape
-    out = np.empty((points, len(basis), joints))
-    lib.series(points, len(basis), joints, terms, pointer(basis), pointer(coefficients), pointer(out))
+    orders, samples, _ = basis.shape
+    out = np.empty((orders, points, samples, joints))
+    lib.series(orders, points, samples, joints, terms, pointer(basis), pointer(coefficients), pointer(out))
     return out
 
 
@@ -132,12 +134,8 @@ class JointFourier:
         """Motions (points, samples, joints) of points (points, dimension) at `times` (samples,), s."""
         basis = self.basis(times)
         coefficients = points.reshape(len(points), len(self.centre), basis.shape[-1])
-        motion = Motion(
-            position=series(basis[0], coefficients),
-            velocity=series(basis[1], coefficients),
-            acceleration=series(basis[2], coefficients),
-        )
-        return Excitation(motion, np.zeros(len(points)))
+        position, velocity, acceleration = series(basis, coefficients)
+        return Excitation(Motion(position, velocity, acceleration), np.zeros(len(points)))
 
     def basis(self, times: Array) -> Array:
         """What one joint's numbers are multiplied by: q and its two derivatives at `times`, (3, samples, 2 N + 1)."""
@@ -210,10 +208,10 @@ class CartesianFourier:
         """The path of the tool point in the base frame, arrays (points, samples)."""
         circle, terms = _cartesian_basis(self.duration, self.harmonics, self.rest, times.tobytes())
         radius = points[:, : self.harmonics].sum(axis=1)[:, None]
-        sines, cosines = np.split(points[:, self.harmonics :], [self.harmonics], axis=1)
-        cosines = np.broadcast_to(cosines, sines.shape)
-        coefficients = np.concatenate([sines, cosines], axis=1)[:, None, :]
-        waves = [series(terms[order], coefficients) for order in range(3)]
+        coefficients = np.empty((len(points), 1, 2 * self.harmonics))
+        coefficients[:, 0, : self.harmonics] = points[:, self.harmonics : 2 * self.harmonics]
+        coefficients[:, 0, self.harmonics :] = points[:, 2 * self.harmonics :]  # one for all harmonics, or one each
+        waves = series(terms, coefficients)
         x, y, z = _add_circle_and_series(radius, circle[0], waves[0])
         return Path(
             position=(x + self.centre[0], y + self.centre[1], z + self.centre[2]),

@@ -113,4 +113,4 @@ def test_peaks_are_numpys() -> None:
     motion = Motion(*rng.normal(size=(3, 4, 9, 2)))
     q, qd, qdd = motion.position, motion.velocity, motion.acceleration
     expected = [q.min(axis=1), q.max(axis=1), np.abs(qd).max(axis=1), np.abs(qdd).max(axis=1)]
-    assert np.array_equal(peaks(motion), np.stack(expected, axis=-1))
+    assert np.array_equal(peaks(motion), np.stack(expected, axis=1))

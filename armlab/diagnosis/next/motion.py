@@ -301,14 +301,15 @@ def recorded_place(recording: Recording) -> RecordedPlace:
 
 def _limits_shown(recording: Recording) -> list[Limits]:
     """The peaks of each joint in a recording, as limits."""
-    run_peaks = np.stack([_motion_peaks(run) for run in recording.runs])
-    low, high = run_peaks[..., 0].min(axis=0), run_peaks[..., 1].max(axis=0)
-    rows = np.column_stack([low, high, run_peaks[..., 2].max(axis=0), run_peaks[..., 3].max(axis=0)]).tolist()
+    lowest, highest, speed, acceleration = np.stack([_motion_peaks(run) for run in recording.runs], axis=1)
+    rows = np.column_stack(
+        [lowest.min(axis=0), *(part.max(axis=0) for part in (highest, speed, acceleration))]
+    ).tolist()
     return [Limits((row[0], row[1]), row[2], row[3]) for row in rows]
 
 
 def _motion_peaks(run: Run) -> Array:
-    """Lowest and highest position, largest speed and acceleration, (joints, 4)."""
+    """Lowest and highest position, largest speed and acceleration, (4, joints)."""
     motion = differentiate(run).motion
     alone = Motion(motion.position[None], motion.velocity[None], motion.acceleration[None])
     return np.asarray(peaks(alone)[0])

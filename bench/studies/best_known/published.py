@@ -148,7 +148,7 @@ def _judge(
 
 def _limit_use(problem: ExcitationProblem, motion: Motion) -> dict[str, float]:
     """Largest share used of each kind of limit."""
-    lowest, highest, speed, acceleration = peaks(motion)[0].T
+    lowest, highest, speed, acceleration = peaks(motion)[0]
     low, high = np.array([limit.position for limit in problem.constraints.limits]).T
     middle, half = (low + high) / 2, (high - low) / 2
     use = {
