@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from bench.studies.speed.clock import median_seconds
-from bench.studies.speed.evaluations import random_motions, with_joint_frames
+from bench.studies.speed.evaluations import (
+    ANCHOR,
+    POPULATION,
+    SINGLE,
+    PipelineFigures,
+    random_motions,
+    with_joint_frames,
+)
 from bench.studies.speed.report import speed_page
 from problem.regressor import rigid_body_torque
 from problem.robot_file import load_arm
@@ -25,6 +32,13 @@ def test_every_pipeline_gives_pinocchios_matrices_and_condition_numbers(arm: str
     figures = compare_pipelines(arm, rounds=1)
     assert figures.matrices_apart < 1e-10
     assert figures.results_apart < 1e-7  # as near as the eigenvalues of a Gram matrix come (see problem/fitness.py)
+
+
+def test_armlabs_share_of_the_anchor_is_that_of_the_same_way_of_calling() -> None:
+    us = {f"armlab, {POPULATION}": 8.0, f"armlab, {SINGLE}": 15.0}
+    anchor = {f"{ANCHOR}, {POPULATION}": 10.0, f"{ANCHOR}, {SINGLE}": 20.0}
+    assert PipelineFigures(3, us | anchor, 0.0, 0.0).shares_of_anchor == {POPULATION: 0.8, SINGLE: 0.75}
+    assert PipelineFigures(3, us, 0.0, 0.0).shares_of_anchor == {}
 
 
 def test_moving_the_links_frames_to_the_joints_moves_nothing_else() -> None:
@@ -50,12 +64,14 @@ def test_the_page_shows_the_ratio_and_every_rival() -> None:
         "condition_number": [
             {
                 "joints": 3,
-                "us": {"armlab, one at a time": 10.0, "Pinocchio": 200.0},
-                "times_pinocchio": {"armlab, one at a time": 20.0, "Pinocchio": 1.0},
+                "us": {"armlab, one at a time": 10.0, f"{ANCHOR}, {SINGLE}": 16.0, "Pinocchio": 200.0},
+                "times_pinocchio": {"armlab, one at a time": 20.0, f"{ANCHOR}, {SINGLE}": 12.5, "Pinocchio": 1.0},
                 "results_apart": 1e-14,
                 "matrices_apart": 2e-15,
+                "shares_of_anchor": {POPULATION: 0.85, SINGLE: 0.95},
             }
         ],
+        "anchor": "CasADi 3, g++ 12, -O3",
         "evaluations_per_second": {"paper": 1e5},
         "derivative_price": {"paper": {"stated": 8, "in_population": 61.4, "single": 9.2, "us": 812.0}},
         "overhead_us": {"spso": {"armlab, one": 1.2, "pygmo, one": 1.6}},
@@ -65,5 +81,7 @@ def test_the_page_shows_the_ratio_and_every_rival() -> None:
     text = speed_page(figures)
     assert "| 3 | armlab, one at a time | 10.0 | 20.0 |" in text
     assert "from Pinocchio's: 2.0e-15" in text
+    assert "| 3 | 0.85 | 0.95 | 12.5 | 11.8 | yes |" in text
+    assert "(CasADi 3, g++ 12, -O3)" in text
     assert "| spso | pygmo, one | 1.60 |" in text
     assert "| samples | 50 | 5.0 |" in text

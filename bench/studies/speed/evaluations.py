@@ -1,10 +1,11 @@
-"""The speed of evaluations: from motions to the condition number beside Pinocchio with numpy and beside compiled C code
-of CasADi, whole evaluations of a problem, and how their time grows.
+"""The speed of evaluations: from motions to the condition number beside Pinocchio with numpy and beside compiled code
+of CasADi, in C and over four lanes in C++, whole evaluations of a problem, and how their time grows.
 """
 
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,14 @@ from armlab.common.arrays import Array
 from armlab.common.derivatives import Question
 from bench.studies.speed.casadi_regressor import compile_regressor
 from bench.studies.speed.clock import median_seconds
+from bench.studies.speed.four_lanes import compile_gram_matrices, cpp_compiler
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
 from problem.contract import DifferentiableProblem, Problem
 from problem.motion import Motion
 from problem.registry import parse_problem
 from problem.robot_file import load_arm
-from problem.spectrum import find_spectrum
+from problem.spectrum import find_spectrum, spectra_of_gram_matrices
 
 POPULATION_SIZE = 50
 PIPELINE_SAMPLES = 100
@@ -30,6 +32,9 @@ PINOCCHIO_ORDER = (0, 1, 2, 3, 4, 6, 9, 5, 7, 8)  # m, mc, Ixx Ixy Iyy Ixz Iyz I
 
 
 REFERENCE = "Pinocchio regressor, numpy.linalg.cond, one at a time"
+POPULATION, SINGLE = f"population of {POPULATION_SIZE}", "one at a time"
+OURS, ANCHOR = "armlab", "CasADi in C++ over four lanes, numpy.linalg.eigvalsh"
+HELPED_ANCHOR = "CasADi in C++ over four lanes, armlab's spectra.c"
 
 
 @dataclass(frozen=True)
@@ -47,16 +52,30 @@ class PipelineFigures:
     matrices_apart: float
 
     @property
+    def has_anchor(self) -> bool:
+        """Whether there was a C++ compiler."""
+        return f"{ANCHOR}, {SINGLE}" in self.us
+
+    @property
     def ratios(self) -> dict[str, float]:
         """How many times as fast as Pinocchio with numpy each pipeline is."""
         return {name: self.us[REFERENCE] / taken for name, taken in self.us.items()}
 
+    @property
+    def shares_of_anchor(self) -> dict[str, float]:
+        """The time of armlab's two pipelines as a share of that of the anchor in the same way of calling."""
+        if not self.has_anchor:
+            return {}
+        return {way: self.us[f"{OURS}, {way}"] / self.us[f"{ANCHOR}, {way}"] for way in (POPULATION, SINGLE)}
+
 
 def compare_pipelines(arm_name: str, rounds: int = PIPELINE_ROUNDS) -> PipelineFigures:
-    """armlab, CasADi's generated C code and Pinocchio with numpy, on one core, taking turns.
+    """armlab, CasADi's generated code and Pinocchio with numpy, on one core, taking turns.
 
-    Pinocchio: its regressor for each sample, the base columns of the stack, `numpy.linalg.cond`. CasADi: see
-    `casadi_regressor`; behind it `numpy.linalg.cond`, or the eigenvalues of the Gram matrix as armlab takes them.
+    Pinocchio: its regressor for each sample, the base columns of the stack, `numpy.linalg.cond`. CasADi in C: see
+    `casadi_regressor`; behind it `numpy.linalg.cond`, or the eigenvalues of the Gram matrix by numpy. The anchor is the
+    Gram matrix of `four_lanes` with numpy's eigenvalues, and the same with armlab's `spectra.c` in their place; it is
+    left out where there is no C++ compiler.
     """
     arm = with_joint_frames(load_arm(arm_name))
     motion = random_motions(arm, POPULATION_SIZE, PIPELINE_SAMPLES)
@@ -64,6 +83,7 @@ def compare_pipelines(arm_name: str, rounds: int = PIPELINE_ROUNDS) -> PipelineF
     columns = base_parameters(arm).columns
     with tempfile.TemporaryDirectory() as folder:
         observe = compile_regressor(arm, columns, Path(folder))
+        four_lanes = compile_gram_matrices(arm, columns, Path(folder)) if cpp_compiler() else None
     stack = _pinocchio_stack(arm, columns)
 
     def each(condition: Callable[[Motion], Array]) -> Callable[[], Array]:
@@ -72,14 +92,21 @@ def compare_pipelines(arm_name: str, rounds: int = PIPELINE_ROUNDS) -> PipelineF
     def of_armlab(some: Motion) -> Array:
         return find_spectrum(arm, some, columns, unit_columns=False).condition_number
 
-    tasks: dict[str, Callable[[], Array]] = {
-        "armlab, population of 50": lambda: of_armlab(motion),
-        "armlab, one at a time": each(of_armlab),
-        "CasADi in C, Gram matrix, population of 50": lambda: _gram_condition(observe(motion)),
-        "CasADi in C, Gram matrix, one at a time": each(lambda single: _gram_condition(observe(single))),
-        "CasADi in C, numpy.linalg.cond, one at a time": each(lambda single: np.linalg.cond(observe(single))),
-        REFERENCE: each(lambda single: np.linalg.cond(stack(single)[None])),
-    }
+    def of_c_code(some: Motion) -> Array:
+        matrices = observe(some)
+        return _condition_by_numpy(np.swapaxes(matrices, 1, 2) @ matrices)
+
+    pipelines: dict[str, Callable[[Motion], Array]] = {OURS: of_armlab}
+    if four_lanes is not None:
+        pipelines[ANCHOR] = lambda some: _condition_by_numpy(four_lanes(some))
+        pipelines[HELPED_ANCHOR] = lambda some: spectra_of_gram_matrices(four_lanes(some))[0].condition_number
+    pipelines["CasADi in C, Gram matrix, numpy.linalg.eigvalsh"] = of_c_code
+    tasks: dict[str, Callable[[], Array]] = {}
+    for name, pipeline in pipelines.items():
+        tasks[f"{name}, {POPULATION}"] = partial(pipeline, motion)
+        tasks[f"{name}, {SINGLE}"] = each(pipeline)
+    tasks[f"CasADi in C, numpy.linalg.cond, {SINGLE}"] = each(lambda single: np.linalg.cond(observe(single)))
+    tasks[REFERENCE] = each(lambda single: np.linalg.cond(stack(single)[None]))
     seconds = median_seconds(tasks, rounds)
     found = {name: task() for name, task in tasks.items()}
     theirs = stack(singles[0])
@@ -91,9 +118,9 @@ def compare_pipelines(arm_name: str, rounds: int = PIPELINE_ROUNDS) -> PipelineF
     )
 
 
-def _gram_condition(matrices: Array) -> Array:
-    """Condition numbers (points,) of matrices (points, rows, columns) from the eigenvalues of their Gram matrices."""
-    squares = np.linalg.eigvalsh(np.swapaxes(matrices, 1, 2) @ matrices)
+def _condition_by_numpy(gram: Array) -> Array:
+    """Condition numbers (points,) from the eigenvalues of Gram matrices (points, n, n)."""
+    squares = np.linalg.eigvalsh(gram)
     return np.asarray(np.sqrt(squares[:, -1] / squares[:, 0]))
 
 

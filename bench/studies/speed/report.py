@@ -4,14 +4,18 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from armlab.common.files import write_whole
 from armlab.common.markdown import markdown_table
 from bench.provenance import provenance
 from bench.studies.speed.evaluations import (
+    ANCHOR,
     ARMS,
     PIPELINE_SAMPLES,
+    POPULATION,
+    SINGLE,
     PipelineFigures,
     compare_pipelines,
     evaluations_per_second,
@@ -20,20 +24,25 @@ from bench.studies.speed.evaluations import (
     growth_with_swarm_size,
     price_of_derivatives,
 )
+from bench.studies.speed.four_lanes import describe_build
 from bench.studies.speed.overhead import measure_overheads
 
 _PIPELINE_READING = """\
-All pipelines take the same random motions. CasADi: the regressor of the arm as a formula, generated as C with common
-subexpressions and compiled with -O3 -march=native for this processor; armlab's kernel takes any arm and any
+All pipelines take the same random motions. CasADi: the regressor of the arm as a formula with common subexpressions,
+generated as C and compiled with -O3 -march=native for this processor, or written out as C++ over four samples, with the
+sum of the Gram matrix in the same pass, fused products and fast mathematics; armlab's kernel takes any arm and any
 processor, and its results are the same to the bit on each. "Times Pinocchio": how many times as fast as Pinocchio's
 regressor with numpy.linalg.cond.
 """
+MIN_ANCHOR_LEAD = MappingProxyType({3: 11.8, 6: 7.7, 7: 6.7})
+"""Joints: how many times as fast as Pinocchio the C++ code, one at a time, was when it was first built by hand."""
 
 
 def measure_speed() -> dict[str, Any]:
     """All figures of the speed report, measured now on one core."""
     return {
         "condition_number": [_pipeline_entry(compare_pipelines(arm)) for arm in ARMS],
+        "anchor": describe_build(),
         "evaluations_per_second": evaluations_per_second(),
         "derivative_price": price_of_derivatives(),
         "overhead_us": measure_overheads(),
@@ -59,6 +68,7 @@ def write_speed_report(folder: Path) -> list[Path]:
 def speed_page(figures: Mapping[str, Any]) -> str:
     """The figures as Markdown tables."""
     conditions, rates = figures["condition_number"], figures["evaluations_per_second"]
+    anchored = [each for each in conditions if each["shares_of_anchor"]]
     return "\n".join(
         [
             "# Speed\n",
@@ -68,6 +78,7 @@ def speed_page(figures: Mapping[str, Any]) -> str:
             markdown_table(["joints", "pipeline", "us a trajectory", "times Pinocchio"], _pipeline_rows(conditions)),
             f"\nLargest relative difference of the condition numbers: {_worst(conditions, 'results_apart')}; of an "
             f"entry of CasADi's observation matrix from Pinocchio's: {_worst(conditions, 'matrices_apart')}.\n",
+            *(_anchor_section(anchored, figures["anchor"]) if anchored else []),
             "## Whole evaluations a second\n",
             markdown_table(["preset", "evaluations a second"], [(name, f"{rate:.0f}") for name, rate in rates.items()]),
             "\n## Price of derivatives\n",
@@ -91,8 +102,33 @@ def speed_page(figures: Mapping[str, Any]) -> str:
     )
 
 
+def _anchor_section(conditions: Sequence[Mapping[str, Any]], build: str) -> list[str]:
+    rows = []
+    for each in conditions:
+        shares, first = each["shares_of_anchor"], MIN_ANCHOR_LEAD[each["joints"]]
+        lead = each["times_pinocchio"][f"{ANCHOR}, {SINGLE}"]
+        counts = "yes" if lead >= first else "no"
+        rows.append(
+            (
+                str(each["joints"]),
+                *(f"{shares[way]:.2f}" for way in (POPULATION, SINGLE)),
+                f"{lead:.1f}",
+                f"{first:.1f}",
+                counts,
+            )
+        )
+    return [
+        "## Beside C++ built by hand\n",
+        f"armlab's time as a share of that of the C++ code over four lanes with numpy.linalg.eigvalsh ({build}). A row "
+        "counts where that code, one at a time, is at least as many times as fast as Pinocchio as it was when it was "
+        "first built. The pipeline with armlab's spectra.c shows what the code would gain from it.\n",
+        markdown_table(["joints", POPULATION, SINGLE, "C++: times Pinocchio", "at first", "counts"], rows),
+        "",
+    ]
+
+
 def _pipeline_entry(found: PipelineFigures) -> dict[str, Any]:
-    return asdict(found) | {"times_pinocchio": found.ratios}
+    return asdict(found) | {"times_pinocchio": found.ratios, "shares_of_anchor": found.shares_of_anchor}
 
 
 def _pipeline_rows(conditions: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
