@@ -115,9 +115,7 @@ def question_of(algorithm: AnyAlgorithm, state: Any) -> Question | None:
 
 def as_loss(fitness: Array) -> Array:
     """A copy in which everything that is not finite, minus infinity too, counts as +infinity."""
-    loss = fitness.copy()
-    loss[~np.isfinite(loss)] = np.inf
-    return loss
+    return np.where(np.isfinite(fitness), fitness, np.inf)
 
 
 def uniform_points(n: int, box: Box, rng: np.random.Generator) -> Array:

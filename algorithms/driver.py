@@ -18,7 +18,6 @@ from algorithms.contract import (
     BrokenContractError,
     as_loss,
     fewest_points,
-    question_of,
 )
 from armlab.common.arrays import Array
 from armlab.common.derivatives import Derivatives, Question
@@ -162,10 +161,11 @@ def iterate(
     """
     into_box = bound_policy(bounds)
     walls = box
+    asking = algorithm if issubclass(algorithm, AsksDerivatives) else None
     while evaluations > 0 and not algorithm.finished(state):
         points, state = algorithm.ask(state)
         asked = _checked_points(algorithm, points, len(box.lower))
-        question = question_of(algorithm, state)
+        question = asking.question(state) if asking is not None else None
         if question is not None and _price(algorithm, asked, source) > evaluations:
             return
         if walls.lower.shape != asked.shape:
@@ -173,8 +173,8 @@ def iterate(
         X = into_box(asked, walls)[:evaluations]
         fitness = _evaluate(objective, X)
         cost = len(X)
-        if question is not None and source is not None and issubclass(algorithm, AsksDerivatives):
-            state = algorithm.tell_derivatives(state, source.differentiate(X[0], question))
+        if asking is not None and question is not None and source is not None:
+            state = asking.tell_derivatives(state, source.differentiate(X[0], question))
             cost = source.price
         if len(X) == len(asked):
             state = algorithm.tell(state, X.copy(), fitness.copy())  # it may write into what it is told

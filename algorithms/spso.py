@@ -38,13 +38,13 @@ from armlab.common.arrays import Array
 class Swarm:
     """Particles (n, d) with velocities, and each one's best point and fitness (n,) so far.
 
-    speed_limit (n, d): the same row for all, since numpy adds equal shapes several times faster than rows; infinite in
-    the reading `text`, in which a velocity goes on at the bounds.
+    velocity_limits (n, d) each: the same rows for all, since numpy adds equal shapes several times faster than rows;
+    infinite in the reading `text`, in which a velocity goes on at the bounds.
     """
 
     position: Array
     velocity: Array
-    speed_limit: Array
+    velocity_limits: Box
     personal_best: Array
     personal_best_fitness: Array
 
@@ -54,7 +54,7 @@ def new_swarm(position: Array, box: Box, velocity_limit: float, reading: TextRea
     velocity_limit = np.inf if reading == "text" else velocity_limit
     limit = np.tile(velocity_limit * (box.upper - box.lower), (len(position), 1))
     unknown = np.full(len(position), np.inf)
-    return Swarm(position.copy(), np.zeros_like(position), limit, position.copy(), unknown)
+    return Swarm(position.copy(), np.zeros_like(position), Box(-limit, limit), position.copy(), unknown)
 
 
 def fly(swarm: Swarm, w: float, c1: float, c2: float, rng: np.random.Generator) -> None:
@@ -62,21 +62,24 @@ def fly(swarm: Swarm, w: float, c1: float, c2: float, rng: np.random.Generator) 
     r1, r2 = rng.random((2, *swarm.position.shape))
     r1 *= swarm.personal_best - swarm.position
     r1 *= c1
-    r2 *= global_best(swarm)[0] - swarm.position
+    pull = np.empty_like(swarm.position)
+    pull[...] = global_best(swarm)[0]
+    pull -= swarm.position
+    r2 *= pull
     r2 *= c2
     velocity = swarm.velocity
     velocity *= w
     velocity += r1
     velocity += r2
-    np.minimum(velocity, swarm.speed_limit, out=velocity)
-    np.maximum(velocity, -swarm.speed_limit, out=velocity)
+    np.minimum(velocity, swarm.velocity_limits.upper, out=velocity)
+    np.maximum(velocity, swarm.velocity_limits.lower, out=velocity)
     swarm.position += velocity
 
 
 def land(swarm: Swarm, X: Array, fitness: Array) -> None:
     """Take the positions where the bound policy put them and remember what is better than before."""
     loss = as_loss(fitness)
-    if np.isfinite(swarm.speed_limit[0, 0]):
+    if swarm.velocity_limits.upper[0, 0] < np.inf:
         np.copyto(swarm.velocity, 0.0, where=swarm.position != X)
     swarm.position[...] = X
     better = loss < swarm.personal_best_fitness
