@@ -99,21 +99,21 @@ INLINE void rotation(const JointData *j, V c, V s, Mat *out) {
 typedef struct { Vec angular, linear; } Screw;
 
 /* Ten entries of the row of one joint for one link, eq. 29-31 and 39:
- * the wrench of the link about its own origin, projected on the joint's motion. */
-INLINE void row_of_link(Vec a, Vec al, Vec w, const V *wxx, Screw s, V *out) {
+ * the wrench of the link about its own origin, projected on the joint's motion; entry k goes to row[places[k]]. */
+INLINE void row_of_link(Vec a, Vec al, Vec w, const V *wxx, Screw s, const int64_t *places, V *row) {
     Vec e = cross(s.angular, w);
     Vec g = cross(a, s.angular);
     V xx = wxx[0], yy = wxx[1], zz = wxx[2], xy = wxx[3], xz = wxx[4], yz = wxx[5];
-    out[0] = dot(s.linear, a);
-    out[1] = (xy + al.z) * s.linear.y + (xz - al.y) * s.linear.z - (yy + zz) * s.linear.x + g.x;
-    out[2] = (xy - al.z) * s.linear.x + (yz + al.x) * s.linear.z - (xx + zz) * s.linear.y + g.y;
-    out[3] = (xz + al.y) * s.linear.x + (yz - al.x) * s.linear.y - (xx + yy) * s.linear.z + g.z;
-    out[4] = s.angular.x * al.x + e.x * w.x;
-    out[5] = s.angular.y * al.y + e.y * w.y;
-    out[6] = s.angular.z * al.z + e.z * w.z;
-    out[7] = s.angular.x * al.y + s.angular.y * al.x + e.x * w.y + e.y * w.x;
-    out[8] = s.angular.x * al.z + s.angular.z * al.x + e.x * w.z + e.z * w.x;
-    out[9] = s.angular.y * al.z + s.angular.z * al.y + e.y * w.z + e.z * w.y;
+    row[places[0]] = dot(s.linear, a);
+    row[places[1]] = (xy + al.z) * s.linear.y + (xz - al.y) * s.linear.z - (yy + zz) * s.linear.x + g.x;
+    row[places[2]] = (xy - al.z) * s.linear.x + (yz + al.x) * s.linear.z - (xx + zz) * s.linear.y + g.y;
+    row[places[3]] = (xz + al.y) * s.linear.x + (yz - al.x) * s.linear.y - (xx + yy) * s.linear.z + g.z;
+    row[places[4]] = s.angular.x * al.x + e.x * w.x;
+    row[places[5]] = s.angular.y * al.y + e.y * w.y;
+    row[places[6]] = s.angular.z * al.z + e.z * w.z;
+    row[places[7]] = s.angular.x * al.y + s.angular.y * al.x + e.x * w.y + e.y * w.x;
+    row[places[8]] = s.angular.x * al.z + s.angular.z * al.x + e.x * w.z + e.z * w.x;
+    row[places[9]] = s.angular.y * al.z + s.angular.z * al.y + e.y * w.z + e.z * w.y;
 }
 
 /* A link's frame in that of its parent: R, and the shift to the joint's axis in the parent's frame. */
@@ -162,9 +162,9 @@ INLINE Screw axis_of(const JointData *d) {
     return (Screw){angular, d->prismatic ? constant(d->axis) : cross(angular, constant(d->after_shift))};
 }
 
-/* rows[(i * joints + j) * 10 + k]: joint i, link j >= i, parameter k, for some samples (eq. 9-39). */
+/* rows[i * stride + places[10 * j + k]]: joint i, link j >= i, parameter k, for some samples (eq. 9-39). */
 INLINE void rows_of_samples(int joints, const JointData *data, const double *gravity, const V *q, const V *qd,
-                            const V *qdd, V *rows) {
+                            const V *qdd, int64_t stride, const int64_t *places, V *rows) {
     Screw screws[MAX_JOINTS];
     Rates rates = at_rest(gravity);
     Frame frame;
@@ -182,7 +182,7 @@ INLINE void rows_of_samples(int joints, const JointData *data, const double *gra
         screws[j] = axis_of(d);
         V products[6] = {w.x * w.x, w.y * w.y, w.z * w.z, w.x * w.y, w.x * w.z, w.y * w.z};
         for (int i = 0; i <= j; i++)
-            row_of_link(a, al, w, products, screws[i], rows + 10 * (i * joints + j));
+            row_of_link(a, al, w, products, screws[i], places + 10 * j, rows + i * stride);
     }
 }
 
@@ -248,12 +248,14 @@ void observation_matrices(int joints, const JointData *data, const double *gravi
                           const double *q, const double *qd, const double *qdd, double *out) {
     V vq[MAX_JOINTS], vqd[MAX_JOINTS], vqdd[MAX_JOINTS], rows[MAX_JOINTS * MAX_JOINTS * 10];
     int width = 10 * joints;
+    int64_t places[MAX_JOINTS * 10];
+    for (int k = 0; k < width; k++) places[k] = k;
     for (int64_t s = 0; s < samples; s += LANES) {
         int count = at_most_lanes(samples - s);
         load(joints, count, joints, q + s * joints, vq);
         load(joints, count, joints, qd + s * joints, vqd);
         load(joints, count, joints, qdd + s * joints, vqdd);
-        rows_of_samples(joints, data, gravity, vq, vqd, vqdd, rows);
+        rows_of_samples(joints, data, gravity, vq, vqd, vqdd, width, places, rows);
         for (int l = 0; l < count; l++)
             for (int i = 0; i < joints; i++) {
                 double *row = out + ((s + l) * joints + i) * width;
@@ -289,7 +291,7 @@ INLINE int panels_of(int n) { return (n + TILE - 1) / TILE; }
 /* Numbers of scratch memory for Gram matrices of n columns: the panels, the tiles and what aligns them. */
 int64_t gram_scratch(int joints, int n) {
     int64_t panels = panels_of(n);
-    return LANES * (panels * CHUNK * joints * TILE + panels * (panels + 1) / 2 * HALVES * TILE * TILE + 1);
+    return LANES * ((panels + 1) * CHUNK * joints * TILE + panels * (panels + 1) / 2 * HALVES * TILE * TILE + 1);
 }
 
 /* Gram matrix of chosen columns of each trajectory's observation matrix, and of further columns behind them, joint by
@@ -301,19 +303,19 @@ FOR_EACH_PROCESSOR
 void gram_matrices(int joints, const JointData *data, const double *gravity, int64_t trajectories, int64_t samples,
                    const double *q, const double *qd, const double *qdd, int chosen, const int *columns,
                    const int *first, int owned, const double *own, double *scratch, double *out) {
-    V vq[MAX_JOINTS], vqd[MAX_JOINTS], vqdd[MAX_JOINTS], rows[MAX_JOINTS * MAX_JOINTS * 10];
-    V vown[MAX_JOINTS * MAX_OWNED];
-    int width = 10 * joints, n = chosen + owned * joints, panels = panels_of(n);
+    V vq[MAX_JOINTS], vqd[MAX_JOINTS], vqdd[MAX_JOINTS], vown[MAX_JOINTS * MAX_OWNED];
+    int n = chosen + owned * joints, panels = panels_of(n);
     int64_t panel = CHUNK * joints * TILE, tiles = panels * (panels + 1) / 2;
     V *chunk = (V *)(((uintptr_t)scratch + sizeof(V) - 1) & ~(uintptr_t)(sizeof(V) - 1));
-    V *sums = chunk + panels * panel;
-    int64_t places[MAX_COLUMNS]; /* of each column, in the rows of the first joint of the first block */
-    int rows_of[MAX_COLUMNS];    /* each panel: up to the last joint in whose rows it can be non-zero */
+    V *sums = chunk + (panels + 1) * panel; /* the last panel is for columns that are not chosen */
+    int64_t places[MAX_JOINTS * 10], own_places[MAX_JOINTS * MAX_OWNED]; /* in the rows of the first joint and block */
+    int rows_of[MAX_COLUMNS]; /* each panel: up to the last joint in whose rows it can be non-zero */
     memset(rows_of, 0, sizeof rows_of);
+    for (int k = 0; k < 10 * joints; k++) places[k] = panels * panel;
     for (int k = 0; k < n; k++) {
         int last = k < chosen ? joints - 1 : (k - chosen) / owned;
         while (k < chosen && first[last] > k) last--;
-        places[k] = k / TILE * panel + k % TILE;
+        *(k < chosen ? places + columns[k] : own_places + k - chosen) = k / TILE * panel + k % TILE;
         rows_of[k / TILE] = last + 1 > rows_of[k / TILE] ? last + 1 : rows_of[k / TILE];
     }
     memset(chunk, 0, sizeof(V) * panels * panel);
@@ -328,18 +330,14 @@ void gram_matrices(int joints, const JointData *data, const double *gravity, int
                 load(joints, count, joints, qd + at, vqd);
                 load(joints, count, joints, qdd + at, vqdd);
                 load(joints * owned, count, joints * owned, own + at * owned, vown);
-                rows_of_samples(joints, data, gravity, vq, vqd, vqdd, rows);
+                V *block = chunk + blocks * joints * TILE;
+                rows_of_samples(joints, data, gravity, vq, vqd, vqdd, TILE, places, block);
+                for (int k = 0; k < joints * owned; k++) block[k / owned * TILE + own_places[k]] = vown[k];
+                if (count == LANES) continue;
                 V present;
                 for (int l = 0; l < LANES; l++) present[l] = l < count;
-                for (int i = 0; i < joints; i++) {
-                    V *place = chunk + (blocks * joints + i) * TILE;
-                    const V *from_row = rows + i * width;
-                    if (count == LANES)
-                        for (int k = first[i]; k < chosen; k++) place[places[k]] = from_row[columns[k]];
-                    else
-                        for (int k = first[i]; k < chosen; k++) place[places[k]] = from_row[columns[k]] * present;
-                    for (int c = 0; c < owned; c++) place[places[chosen + i * owned + c]] = vown[i * owned + c];
-                }
+                for (int t = 0; t < panels; t++)
+                    for (int k = 0; k < joints * TILE; k++) block[t * panel + k] *= present;
             }
             V *sum = sums;
             for (int t = 0; t < panels; t++)
@@ -352,7 +350,8 @@ void gram_matrices(int joints, const JointData *data, const double *gravity, int
             for (int u = t; u < panels; u++, sum += HALVES * TILE * TILE)
                 for (int e = 0; e < TILE * TILE; e++) {
                     int k = TILE * t + e / TILE, c = TILE * u + e % TILE;
-                    V a = sum[e], b = sum[TILE * TILE + e];
+                    double a[LANES], b[LANES];
+                    memcpy(a, sum + e, sizeof a), memcpy(b, sum + TILE * TILE + e, sizeof b);
                     if (k < n && c < n)
                         gram[k * n + c] = gram[c * n + k] =
                             ((a[0] + a[1]) + (a[2] + a[3])) + ((b[0] + b[1]) + (b[2] + b[3]));
