@@ -117,13 +117,14 @@ def _layout(columns: bytes, kind: str, joints: int, owned: int) -> _Layout:
 
 def _sum_products(arm: Arm, motion: Motion, layout: _Layout, own: object) -> Array:
     """The Gram matrices of a motion; own: what the own columns hold, as a C pointer."""
-    out = np.empty((*motion.batch, layout.size, layout.size))
+    *batch, samples, joints = motion.position.shape
+    out = np.empty((*batch, layout.size, layout.size))
     scratch = np.empty(layout.scratch)
     lib.gram_matrices(
-        motion.joints,
+        joints,
         *_kernel_data(arm),
-        math.prod(motion.batch),
-        motion.samples,
+        math.prod(batch),
+        samples,
         *_motion_pointers(motion),
         layout.count,
         layout.chosen,

@@ -121,7 +121,8 @@ def compare_pipelines(arm_name: str, rounds: int = PIPELINE_ROUNDS) -> PipelineF
 def _condition_by_numpy(gram: Array) -> Array:
     """Condition numbers (points,) from the eigenvalues of Gram matrices (points, n, n)."""
     squares = np.linalg.eigvalsh(gram)
-    return np.asarray(np.sqrt(squares[:, -1] / squares[:, 0]))
+    condition: Array = np.sqrt(squares[:, -1] / squares[:, 0])
+    return condition
 
 
 def with_joint_frames(arm: Arm) -> Arm:

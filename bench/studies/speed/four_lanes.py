@@ -42,8 +42,12 @@ static inline void regressor(const v4 *q, const v4 *qd, const v4 *qdd, v4 *out) 
 }}
 
 static inline void load(long long left, const double *from, v4 *to) {{
+    const double *a = from, *b = a + {joints}, *c = b + {joints}, *d = c + {joints};
     for (int j = 0; j < {joints}; j++)
-        for (int l = 0; l < 4; l++) to[j][l] = l < left ? from[l * {joints} + j] : 0;
+        if (left >= 4)
+            to[j] = (v4){{a[j], b[j], c[j], d[j]}};
+        else
+            for (int l = 0; l < 4; l++) to[j][l] = l < left ? from[l * {joints} + j] : 0;
 }}
 
 static const int first[] = {{{first}}};
@@ -103,13 +107,14 @@ def compile_gram_matrices(arm: Arm, columns: NDArray[np.intp], folder: Path) -> 
     subprocess.run([compiler, *COMPILER_OPTIONS, str(source), "-o", str(library), "-lm"], check=True)
     ffi = cffi.FFI()
     ffi.cdef("void gram_matrices(long long, long long, const double *, const double *, const double *, double *);")
-    run = ffi.dlopen(str(library)).gram_matrices
+    run, chosen = ffi.dlopen(str(library)).gram_matrices, len(columns)
+    at, numbers = ffi.from_buffer, ffi.typeof("double *")
 
     def gram_matrices(motion: Motion) -> Array:
-        out = np.empty((*motion.batch, len(columns), len(columns)))
-        states = (motion.position, motion.velocity, motion.acceleration)
-        pointers = [ffi.from_buffer("double *", array) for array in (*states, out)]
-        run(len(motion.position), motion.samples, *pointers)
+        q, qd, qdd = motion.position, motion.velocity, motion.acceleration
+        trajectories, samples, _ = q.shape
+        out = np.empty((trajectories, chosen, chosen))
+        run(trajectories, samples, at(numbers, q), at(numbers, qd), at(numbers, qdd), at(numbers, out))
         return out
 
     return gram_matrices
