@@ -1,6 +1,6 @@
 """Everything that the report shows of one problem, computed once."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,6 +26,8 @@ from bench.statistics.performance import (
 
 CURVE_POINTS = 60  # at which convergence is drawn
 QUARTILES = (0.25, 0.5, 0.75)
+BUDGET_SHARES = (0.1, 0.3, 1.0)  # of the evaluations, at which algorithms are rated
+TARGET_SHARES = (0.25, 0.5, 0.75)  # of the way from easy to hard, of the targets for which they are
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +51,8 @@ class Cell:
 
     moments: numbers of evaluations, evenly spaced in the logarithm, from the first population to the budget. targets:
     from the worst of the first feasible values to the best positive one of all, and 0 where it was reached; empty if
-    nothing feasible was found.
+    nothing feasible was found. fixed_budget: the best so far at each of BUDGET_SHARES, a row a repetition and a column
+    an algorithm. fixed_target: evaluations until each of TARGET_SHARES, likewise.
     """
 
     label: str
@@ -57,6 +60,8 @@ class Cell:
     moments: Array
     targets: Array
     progress: Mapping[str, RunProgress]
+    fixed_budget: tuple[pd.DataFrame, ...]
+    fixed_target: tuple[pd.DataFrame, ...]
 
     @property
     def problem(self) -> str:
@@ -117,10 +122,7 @@ class Cell:
 
 def analyse_cells(results: ResultSet) -> list[Cell]:
     """All cells in the order of the configuration; the runs of only one cell are in memory at a time."""
-    return [
-        analyse_cell(label, trials, _sort_runs(runs_by_algorithm(trials, curves)))
-        for label, trials, curves in results.cells()
-    ]
+    return [analyse_cell(label, trials, runs_by_algorithm(trials, curves)) for label, trials, curves in results.cells()]
 
 
 def losses_by_problem(cells: Sequence[Cell]) -> pd.DataFrame:
@@ -132,24 +134,41 @@ def losses_by_problem(cells: Sequence[Cell]) -> pd.DataFrame:
     return losses if len(cells) == 1 else losses.groupby([cell.problem for cell in cells], sort=False).mean()
 
 
-def analyse_cell(label: str, trials: pd.DataFrame, runs: Mapping[str, Sequence[Run]]) -> Cell:
-    """A cell from its runs by algorithm; trials: tidy, of one budget."""
+def analyse_cell(label: str, trials: pd.DataFrame, numbered: Mapping[str, Mapping[int, Run]]) -> Cell:
+    """A cell from its runs by algorithm and repetition; trials: tidy, of one budget."""
+    runs = {name: [by_number[k] for k in sorted(by_number)] for name, by_number in numbered.items()}
     budget = int(trials["budget"].iloc[0])
     first = min(run.evaluations[0] for some in runs.values() for run in some)
     moments = np.unique(np.geomspace(first, max(budget, first), CURVE_POINTS).round())
     targets = _choose_targets([run for some in runs.values() for run in some])
     progress = {name: _summarise_progress(some, moments, targets, budget) for name, some in runs.items()}
-    return Cell(label, trials, moments, targets, progress)
+    rated = targets[[round(share * (len(targets) - 1)) for share in TARGET_SHARES]] if len(targets) else targets
+    return Cell(
+        label,
+        trials,
+        moments,
+        targets,
+        progress,
+        _by_repetition(numbered, lambda run: _best_at(run, np.array(BUDGET_SHARES) * budget), len(BUDGET_SHARES)),
+        _by_repetition(numbered, lambda run: running_times(run, rated), len(rated)),
+    )
+
+
+def _by_repetition(
+    runs: Mapping[str, Mapping[int, Run]], measure: Callable[[Run], Array], count: int
+) -> tuple[pd.DataFrame, ...]:
+    """Each of `count` numbers that are measured of a run: a row a repetition, a column an algorithm."""
+    found = {name: {number: measure(run) for number, run in of.items()} for name, of in runs.items()}
+    return tuple(
+        pd.DataFrame({name: {number: values[k] for number, values in of.items()} for name, of in found.items()})
+        for k in range(count)
+    )
 
 
 def share_of_targets_reached(cells: Sequence[Cell], algorithm: str, moments: Array) -> Array:
     """Share of targets reached at moments (moments,), over all runs and all cells with targets."""
     found = [cell.progress[algorithm].hits for cell in cells if len(cell.targets)]
     return share_reached(found, moments) if found else np.zeros(len(moments))
-
-
-def _sort_runs(runs: Mapping[str, Mapping[int, Run]]) -> dict[str, list[Run]]:
-    return {name: [by_number[k] for k in sorted(by_number)] for name, by_number in runs.items()}
 
 
 def _choose_targets(runs: Sequence[Run]) -> Array:

@@ -145,6 +145,7 @@ def report_page(results: ResultSet, cells: Sequence[Cell], facts: Sequence[Algor
         problems=[
             sections.ProblemPart(cell.label, sections.ends_table(cell), sections.duels_table(cell)) for cell in cells
         ],
+        ratings=sections.rating_part(cells),
         power=sections.power_part(cells),
         properties=sections.properties_part(facts),
         origin=sections.origin_part(results),

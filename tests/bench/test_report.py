@@ -14,7 +14,7 @@ from armlab.common.report.palette import series_style
 from bench.report.analysis import Cell, analyse_cell, analyse_cells, losses_by_problem
 from bench.report.page import page_data, report_page, write_report
 from bench.report.ranking_chart import draw_critical_difference
-from bench.report.sections import ends_table, format_number, headline, tally_table
+from bench.report.sections import ends_table, format_number, headline, rating_part, tally_table
 from bench.result_sets.formats import read_results, share_results
 from bench.result_sets.result_set import ResultSet, TableOfCurves
 from bench.statistics.critical_difference import block_losses, critical_difference, paired_ranking
@@ -45,8 +45,8 @@ def cell() -> Cell:
     )
     moments = np.array([10.0, 20.0])
     runs = {
-        "a": [Run(moments, np.array([100.0, 10.0])), Run(moments, np.array([40.0, 20.0]))],
-        "b": [Run(moments, np.array([50.0, 5.0])), Run(moments, np.array([np.inf, np.inf]))],
+        "a": {0: Run(moments, np.array([100.0, 10.0])), 1: Run(moments, np.array([40.0, 20.0]))},
+        "b": {0: Run(moments, np.array([50.0, 5.0])), 1: Run(moments, np.array([np.inf, np.inf]))},
     }
     return analyse_cell("small", trials, runs)
 
@@ -96,6 +96,23 @@ def test_targets_go_from_the_worst_first_feasible_value_to_the_best_of_all(cell:
     assert cell.targets[[0, -1]].tolist() == pytest.approx([100.0, 5.0])
     assert cell.progress["a"].expected[[0, -1]].tolist() == [10.0, np.inf]
     assert cell.progress["b"].expected[[0, -1]].tolist() == [30.0, 40.0]
+
+
+def test_runs_are_compared_at_shares_of_the_budget_and_by_their_times_to_targets(cell: Cell) -> None:
+    tenth, third, whole = cell.fixed_budget
+    assert tenth.to_numpy().tolist() == third.to_numpy().tolist() == [[np.inf, np.inf]] * 2  # before the first value
+    assert whole.to_dict("list") == {"a": [10.0, 20.0], "b": [5.0, np.inf]}
+    assert cell.fixed_target[0].to_dict("list") == {
+        "a": [20.0, 10.0],
+        "b": [20.0, np.inf],
+    }  # 47.3, a quarter of the way
+
+
+def test_the_page_rates_every_algorithm_for_each_budget_and_each_target(results: ResultSet) -> None:
+    table = rating_part(analyse_cells(results)).table
+    assert len(table.rows) == 3
+    assert len(table.headings) == 1 + 3 + 3
+    assert "<h3>Budgets and targets</h3>" in report_page(results, analyse_cells(results), [])
 
 
 def test_a_problem_on_which_nothing_feasible_was_found_has_no_targets_and_still_a_page(results: ResultSet) -> None:
