@@ -93,6 +93,36 @@ class ArmShape:
             gaps[number] = mujoco.mj_geomDistance(self.model, self.data, one, other, MAX_DISTANCE, None)
         return np.asarray(np.minimum.reduceat(gaps, self._starts))
 
+    def distance_slopes(self, positions: Array, samples: NDArray[np.intp], pairs: NDArray[np.intp]) -> Array:
+        """Derivatives of the distances of pairs (chosen,) at samples (chosen,) of positions (samples, joints).
+
+        Returns (chosen, joints), m per rad (m per m): n . (v - u), where n points from the nearest point of the first
+        part to that of the second, and u and v are their movements. The nearest points themselves do not count
+        (envelope theorem); where two are equally near, the slope is that of one.
+        """
+        mujoco, out = import_mujoco(), np.empty((len(samples), len(self.arm)))
+        for sample in np.unique(samples).tolist():
+            self.data.qpos[: positions.shape[1]] = positions[sample]
+            mujoco.mj_kinematics(self.model, self.data)
+            mujoco.mj_comPos(self.model, self.data)
+            for row in np.flatnonzero(samples == sample).tolist():
+                out[row] = self._slope(self.pairs[int(pairs[row])])
+        return out
+
+    def _slope(self, pair: PartPair) -> Array:
+        """The same for one pair at the present pose, (joints,)."""
+        mujoco, nearest, ends = import_mujoco(), np.inf, np.empty(6)
+        for one, other in pair.geoms.tolist():
+            between = np.empty(6)
+            distance = mujoco.mj_geomDistance(self.model, self.data, one, other, MAX_DISTANCE, between)
+            if distance < nearest:
+                nearest, ends, bodies = distance, between, self.model.geom_bodyid[[one, other]]
+        moves = np.empty((2, 3, self.model.nv))
+        for move, point, body in zip(moves, ends.reshape(2, 3), bodies, strict=True):
+            mujoco.mj_jac(self.model, self.data, move, None, point, int(body))
+        normal = np.diff(ends.reshape(2, 3), axis=0)[0] / (nearest or np.inf)
+        return np.asarray(normal @ (moves[1] - moves[0]))[: len(self.arm)]
+
     def _bounds(self, first: Array, second: Array) -> Array:
         """Distances of the bounding spheres about centres (pairs, 3) of geoms; of a plane its own."""
         radii = self.model.geom_rbound[np.array(self._geoms)].sum(axis=0)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from problem.arm import Arm, Limits, body_points
@@ -65,6 +66,14 @@ class Constraints:
         beyond = excitation.overreach > 0
         violation[beyond] = 1e3 * (1.0 + excitation.overreach[beyond])
         return violation
+
+    def margins(self, positions: Array) -> Array:
+        """What else is kept at positions (samples, joints), negative where it is broken, (rows,): nothing here."""
+        return np.empty(0)
+
+    def margin_slopes(self, positions: Array, chosen: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array]:
+        """Samples (chosen,) of chosen rows of `margins`, and their derivatives (chosen, joints) along the positions."""
+        return np.zeros(0, dtype=np.intp), np.empty((0, positions.shape[1]))
 
     def _excesses(self, motion: Motion) -> Array:
         """Relative excess of each limit, (points, limits)."""

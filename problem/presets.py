@@ -25,6 +25,7 @@ from problem.functions import FUNCTIONS, TestFunction
 from problem.inverse_kinematics import planar_arm
 from problem.limits import Constraints, Workspace
 from problem.robot_file import load_arm
+from problem.safe_motion import ClearanceSettings, SafeConstraints, SafetySettings, safety_rules
 from problem.trajectories import CartesianFourier, JointFourier, Trajectory
 
 Positive = Annotated[float, Gt(0)]
@@ -138,7 +139,8 @@ class ExcitationSettings(Settings):
     a choice. unit_columns: scale columns to unit length. friction_columns: identify Coulomb friction, viscous friction
     and a torque offset of each joint, too, three columns a joint (`problem.friction`). tool: a point in the last link's
     frame, m, that the workspace limits too. frame_seed: search in randomly shifted coordinates. penalty: or
-    `feasibility_rules` (Deb 2000).
+    `feasibility_rules` (Deb 2000). collisions: distances that the arm keeps from itself, a floor and boxes, at the
+    samples with a margin for what lies between them (`problem.safe_motion`); not looked at if left out.
     """
 
     arm: str = "irb120-arm"
@@ -154,6 +156,7 @@ class ExcitationSettings(Settings):
     workspace: WorkspaceSettings = WorkspaceSettings()
     tool: Vector = (0.0, 0.0, 0.0)
     frame_seed: Annotated[int, Ge(0)] | None = None
+    collisions: ClearanceSettings | None = Field(default=None, exclude_if=operator.not_)
 
     title: ClassVar[str] = ""
 
@@ -174,13 +177,20 @@ class ExcitationSettings(Settings):
             trajectory=trajectory,
             duration=self.duration,
             samples=self.samples,
-            constraints=Constraints(arm, limits, self.workspace.build(self.tool)),
+            constraints=self._constraints(arm, limits),
             criterion=self.criterion.build(),
             penalty=FeasibilityRules() if self.penalty == "feasibility_rules" else self.penalty.build(),
             unit_columns=self.unit_columns,
             friction_columns=self.friction_columns,
         )
         return problem if self.frame_seed is None else shift_randomly(problem, self.frame_seed)
+
+    def _constraints(self, arm: Arm, limits: tuple[Limits, ...]) -> Constraints:
+        workspace = self.workspace.build(self.tool)
+        if self.collisions is None:
+            return Constraints(arm, limits, workspace)
+        rules = safety_rules(arm, self.arm, limits, SafetySettings(**dict(self.collisions)), None)
+        return SafeConstraints(arm, limits, workspace, rules=rules)
 
     def trajectory(self, arm: Arm) -> Trajectory:
         """The family of trajectories that is searched."""

@@ -5,7 +5,7 @@ keep-out boxes and to the arm itself; as rules, and as a constraint of a search.
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.util import find_spec
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from annotated_types import Ge, Gt
@@ -25,33 +25,45 @@ START_REACH = {"revolute": 0.1, "prismatic": 0.02}  # rad, m: near a pose; also 
 SEARCH_POSES = 150  # of a motion in a search
 SEARCH_MARGIN = 0.01  # m more than the clearance that a search asks for, since it sees fewer poses
 ROUNDING = 1e-6  # m
+STRETCH_POSES = 10  # poses of which a search with derivatives sees the closest alone
 TOUCH_POSES = 200  # random poses: parts that are too close in all of them touch by their shape
 
 Range = tuple[float, float]
 
 
-class SafetySettings(Settings):
-    """What a motion keeps beside the limits of the robot file; base frame, m and rad.
+class ClearanceSettings(Settings):
+    """What an arm keeps off beside itself, base frame, m.
 
-    floor: its height. keep_out: boxes, each with its lower and its upper corner. near: the pose near which the motion
-    starts and ends, one number a joint. range: [lower, upper] of each joint, or `robot` for that of the robot file; if
-    left out that of a recording, where there is one. clearance: distance to keep. radius: of the capsules that stand
-    for a robot without collision geometry.
+    floor: its height. keep_out: boxes, each with its lower and its upper corner. clearance: distance to keep. radius:
+    of the capsules that stand for a robot without collision geometry.
     """
 
     floor: float | None = None
     keep_out: tuple[Box, ...] = ()
-    near: tuple[float, ...] | None = None
-    range: Literal["robot"] | tuple[Range, ...] | None = None
     clearance: Annotated[float, Ge(0)] = 0.02
     radius: Annotated[float, Gt(0)] | None = None
 
     @model_validator(mode="after")
-    def _in_order(self) -> "SafetySettings":
+    def _corners_in_order(self) -> Self:
         for low, high in self.keep_out:
             for axis, lower, upper in zip("xyz", low, high, strict=True):
                 if lower >= upper:
                     raise ValueError(f"keep_out: the lower corner comes first, but {axis} goes from {lower} to {upper}")
+        return self
+
+
+class SafetySettings(ClearanceSettings):
+    """What a motion keeps beside the limits of the robot file; rad (m).
+
+    near: the pose near which the motion starts and ends, one number a joint. range: [lower, upper] of each joint, or
+    `robot` for that of the robot file; if left out that of a recording, where there is one.
+    """
+
+    near: tuple[float, ...] | None = None
+    range: Literal["robot"] | tuple[Range, ...] | None = None
+
+    @model_validator(mode="after")
+    def _ends_in_order(self) -> Self:
         for low_end, high_end in self.range if isinstance(self.range, tuple) else ():
             if low_end >= high_end:
                 raise ValueError(f"range should be lower, upper: not {low_end} to {high_end}")
@@ -94,9 +106,33 @@ class SafetyRules:
         """Sum over the pairs of how much closer than a search allows they come at positions (samples, joints), m."""
         if self.shape is None or not self.shape.pairs:
             return 0.0
-        chosen = positions[:: max(1, len(positions) // SEARCH_POSES)]
-        distances = self.shape.distances(chosen, close=self.settings.clearance + SEARCH_MARGIN)
+        distances = self.shape.distances(_search_poses(positions), close=self.settings.clearance + SEARCH_MARGIN)
         return float(np.maximum(self._asked - distances.min(axis=0), 0.0).sum())
+
+    def margins(self, positions: Array) -> Array:
+        """How much farther apart than a search asks for each pair comes in each stretch of a motion, (rows,), m.
+
+        positions: (samples, joints). Negative where a pair is too close.
+        """
+        if self.shape is None:
+            return np.empty(0)
+        distances = self.shape.distances(_search_poses(positions)) - self._asked
+        return np.minimum.reduceat(distances, np.arange(0, len(distances), STRETCH_POSES)).ravel()
+
+    def margin_slopes(self, positions: Array, chosen: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array]:
+        """The samples (chosen,) at which chosen margins are taken, and their derivatives with respect to the positions
+        there, (chosen, joints), m per rad (m per m).
+        """
+        if self.shape is None or not len(chosen):
+            return np.zeros(0, dtype=np.intp), np.empty((0, positions.shape[1]))
+        stretches, pairs = np.divmod(chosen, len(self.shape.pairs))
+        distances = self.shape.distances(_search_poses(positions))
+        nearest = [
+            first + np.argmin(distances[first : first + STRETCH_POSES, pair])
+            for first, pair in zip((stretches * STRETCH_POSES).tolist(), pairs.tolist(), strict=True)
+        ]
+        samples = np.array(nearest, dtype=np.intp) * _search_stride(len(positions))
+        return samples, self.shape.distance_slopes(positions, samples, pairs)
 
     @cached_property
     def _asked(self) -> Array:
@@ -118,6 +154,23 @@ class SafeConstraints(Constraints):
         """Sum over all limits and pairs of parts, (points,): 0 where everything is kept."""
         short = [self.rules.shortfall(each) for each in excitation.motion.position]
         return np.asarray(super().violation(excitation) + np.log1p(short))
+
+    def margins(self, positions: Array) -> Array:
+        """How far each pair is from being too close in each stretch of positions (samples, joints), m, (rows,)."""
+        return self.rules.margins(positions)
+
+    def margin_slopes(self, positions: Array, chosen: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array]:
+        """Samples (chosen,) of chosen rows of `margins`, and their derivatives (chosen, joints) along the positions."""
+        return self.rules.margin_slopes(positions, chosen)
+
+
+def _search_stride(samples: int) -> int:
+    return max(1, samples // SEARCH_POSES)
+
+
+def _search_poses(positions: Array) -> Array:
+    """The positions (samples, joints) that a search looks at."""
+    return positions[:: _search_stride(len(positions))]
 
 
 def safety_rules(

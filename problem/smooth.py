@@ -54,7 +54,8 @@ class LimitRows:
     """Distances of positions, velocities and accelerations at all samples to their limits.
 
     First to the upper limits, then to the lower ones, in units of half of the range between the two; infinite where
-    there is no limit, or where the search space keeps it.
+    there is no limit, or where the search space keeps it. Then the constraints' own margins, of parts that must not
+    come close.
     """
 
     problem: Excitation
@@ -63,13 +64,17 @@ class LimitRows:
         """Distances (rows,) of a motion (samples, joints); negative where a limit is broken."""
         values = np.stack([motion.position, motion.velocity, motion.acceleration])
         low, high, half = self._limits
-        return np.concatenate([((high - values) / half).ravel(), ((values - low) / half).ravel()])
+        own = self.problem.constraints.margins(motion.position)
+        return np.concatenate([((high - values) / half).ravel(), ((values - low) / half).ravel(), own])
 
-    def slopes(self, basis: Array, chosen: NDArray[np.intp]) -> Array:
+    def slopes(self, motion: Motion, basis: Array, chosen: NDArray[np.intp]) -> Array:
         """Derivatives (chosen, dimension) of chosen distances along the tangents (3, dimension, samples, joints)."""
         each = np.moveaxis(basis / self._limits[2][:, None], 1, 0).reshape(basis.shape[1], -1)
-        upper = chosen < each.shape[1]
-        return np.asarray(np.where(upper, -1.0, 1.0)[:, None] * each[:, chosen % each.shape[1]].T)
+        limits, own = chosen[chosen < 2 * each.shape[1]], chosen[chosen >= 2 * each.shape[1]]
+        signs = np.where(limits < each.shape[1], -1.0, 1.0)[:, None]
+        samples, slopes = self.problem.constraints.margin_slopes(motion.position, own - 2 * each.shape[1])
+        along = np.einsum("rj,drj->rd", slopes, basis[0][:, samples])
+        return np.concatenate([signs * each[:, limits % each.shape[1]].T, along])
 
     @cached_property
     def _limits(self) -> tuple[Array, Array, Array]:
@@ -93,4 +98,4 @@ def differentiate(problem: Excitation, rows: LimitRows, point: Array, question: 
         margins = rows.distances(motion)
         near = np.flatnonzero(margins < question.within)
         watched = np.union1d(question.watched, near).astype(np.intp)
-        return Derivatives(value, slope, margins, watched, rows.slopes(basis, watched))
+        return Derivatives(value, slope, margins, watched, rows.slopes(motion, basis, watched))

@@ -1,6 +1,7 @@
 """Suites of named problems: a name like `suite-1/irb120-joint-h5-t10-origin` always means the same problem."""
 
 import dataclasses
+import operator
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -11,7 +12,7 @@ from pydantic import Field, field_validator
 from armlab.common.errors import InputError
 from armlab.common.settings import Settings, read_yaml, suggest_name, validate
 from problem.excitation import ExcitationProblem, ShiftedProblem
-from problem.presets import JointFourierSettings, PaperSettings, PenaltyOrRules, SearchSpace
+from problem.presets import CriterionSettings, JointFourierSettings, PaperSettings, PenaltyOrRules, SearchSpace
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
 Definition = Annotated[PaperSettings | JointFourierSettings, Field(discriminator="preset")]
@@ -24,11 +25,14 @@ class SuiteFile(Settings):
 
 
 class InstanceSettings(Settings):
-    """A problem of a suite by its full name; only its penalty and, in joint space, its search space can be chosen."""
+    """A problem of a suite by its full name; only its criterion, its penalty and, in joint space, its search space can
+    be chosen.
+    """
 
     preset: str
     penalty: PenaltyOrRules | None = None
     search_space: SearchSpace | None = None
+    criterion: CriterionSettings | None = Field(default=None, exclude_if=operator.not_)  # written ones stay the same
 
     @field_validator("preset")
     @classmethod

@@ -12,6 +12,7 @@ from problem.excitation import ExcitationProblem
 from problem.fitness import Criterion
 from problem.gradient import motion_of
 from problem.registry import parse_problem
+from problem.safe_motion import SafeConstraints
 from problem.smooth import LimitRows, smooth_criterion
 
 TINY = {"preset": "joint-fourier", "joints": 2, "harmonics": 2, "samples": 30}
@@ -80,6 +81,28 @@ def test_value_and_margins_have_the_slopes_of_differences(settings: dict[str, An
         np.testing.assert_allclose(found.margin_slopes[:, k], moved, atol=1e-6 * max(1.0, np.abs(moved).max()))
 
 
+def test_distances_of_parts_have_the_slopes_of_differences_and_the_sign_of_the_violation() -> None:
+    problem = build(preset="joint-fourier", arm="irb120", harmonics=2, samples=30, collisions={"floor": 0.0})
+    assert isinstance(problem, ExcitationProblem)
+    limits, rules = 2 * 3 * 30 * 6, problem.constraints
+    assert isinstance(rules, SafeConstraints)
+    drawn = np.random.default_rng(1).uniform(problem.lower, problem.upper, (20, len(problem.lower)))
+    positions = [motion_of(problem, point).position for point in drawn]
+    closest = np.array([rules.margins(each).min() for each in positions])
+    assert np.array_equal(closest < 0, [rules.rules.shortfall(each) > 0 for each in positions])
+    point = drawn[np.argmin(closest)]
+
+    def at(x: Array) -> Derivatives:
+        return problem.differentiate(x, Question(20.0, NOTHING, 0.3))
+
+    found, step = at(point), 1e-6
+    own = found.watched >= limits
+    assert found.margins[limits:].min() == closest.min() < 0
+    for k, unit in enumerate(step * np.eye(len(point))):
+        moved = (at(point + unit).margins - at(point - unit).margins)[found.watched[own]] / (2 * step)
+        np.testing.assert_allclose(found.margin_slopes[own, k], moved, atol=1e-6)
+
+
 def test_only_the_limits_that_are_asked_for_or_near_come_with_slopes() -> None:
     problem = tiny()
     point = 0.6 * problem.upper + 0.4 * problem.lower
@@ -104,7 +127,10 @@ def test_a_shift_of_the_coordinates_changes_no_derivative() -> None:
     [
         ({"limits": {"torque": 5.0}, "arm": "irb120-arm"}, "derivatives of a torque limit are not known"),
         ({"workspace": {"floor": 0.1}}, "derivatives of a workspace limit are not known"),
-        ({"preset": "tell-apart", "joints": 2, "harmonics": 2}, "its value is no function of the singular values"),
+        (
+            {"preset": "tell-apart", "joints": 2, "limits": {"torque": 5.0}},
+            "derivatives of a torque limit are not known",
+        ),
     ],
 )
 def test_a_problem_without_derivatives_says_why(settings: dict[str, Any], reason: str) -> None:

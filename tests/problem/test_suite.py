@@ -97,7 +97,18 @@ def test_a_problem_of_a_suite_takes_another_way_to_treat_constraints_and_nothing
     ruled, penalised = built(name, penalty="feasibility_rules"), built(name)
     points = np.random.default_rng(0).uniform(ruled.lower, ruled.upper, (40, len(ruled.lower)))
     np.testing.assert_array_equal(ruled.evaluate(points).value, penalised.evaluate(points).value)
-    assert refusal(built, name, harmonics=3) == "unknown key 'harmonics' in test: known: preset, penalty, search_space"
+    told = refusal(built, name, harmonics=3)
+    assert told == "unknown key 'harmonics' in test: known: preset, penalty, search_space, criterion"
+
+
+@pytest.mark.parametrize("name", instances("suite-4"))
+def test_suite_4_is_suite_2_with_collisions_and_a_floor(name: str) -> None:
+    definition = definition_of(name)
+    without = definition_of(name.replace("suite-4/", "suite-2/").removesuffix("-floor"))
+    assert definition.collisions is not None
+    assert definition.collisions.floor == 0.0
+    assert definition.model_copy(update={"collisions": None}) == without
+    assert why_not_differentiable(built(name)) == ""
 
 
 def test_names_of_presets_leave_the_problems_of_suites_out() -> None:
