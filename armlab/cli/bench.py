@@ -264,11 +264,27 @@ def best_known(minutes: float, problem: str | None, results: Path) -> Iterator[s
 def published(records: Path, results: Path) -> ResultLines:
     """Judge published trajectories beside the best known.
 
-    Recomputes the condition numbers of the trajectories in configs/published.yaml and writes published.md.
+    Recomputes the condition numbers of the trajectories in configs/published.yaml and writes published.md, and the
+    table of records, records.md.
     """
     from bench.studies.best_known.published import write_published
 
     return written_files(write_published(results, records))
+
+
+@click.command()
+@click.argument("submission", type=click.Path(path_type=Path))
+@_RECORDS_OPTION
+@prints_result
+def submit(submission: Path, records: Path) -> ResultLines:
+    """Recompute and verify a trajectory of yours beside a record.
+
+    SUBMISSION: a YAML file with problem, coefficients and by. Refuses a motion that breaks a limit or comes too close
+    to itself or a floor at any instant, else prints its row for the table of records. Writes nothing.
+    """
+    from bench.studies.best_known.submit import judge_submission
+
+    return judge_submission(submission, records)
 
 
 @click.command()

@@ -111,6 +111,7 @@ _NOUNS: Mapping[str, tuple[str, Sections]] = {
             "Trajectories": {
                 "best-known": "armlab.cli.bench:best_known",
                 "published": "armlab.cli.bench:published",
+                "submit": "armlab.cli.bench:submit",
                 "export": "armlab.cli.bench:export",
             },
         },

@@ -14,9 +14,10 @@ from armlab.common.files import write_whole
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.settings import Settings, read_yaml, validate
 from bench.studies.best_known.records import build_excitation, known_values, read_search_plan
+from bench.studies.best_known.records_table import RECORDS_PAGE, records_page
 from bench.studies.best_known.search import CONFIG_FILE as PLAN_FILE
+from bench.studies.best_known.verify import limit_use
 from problem.excitation import ExcitationProblem
-from problem.limits import peaks
 from problem.motion import Motion
 from problem.registry import parse_problem
 from problem.trajectories import fourier_terms, sample_instants
@@ -142,25 +143,12 @@ def _judge(
         value=float(problem.spectrum(motion).condition_number[0]),
         best=known[trajectory.problems[columns]],
         same_family=known[trajectory.same_family[columns]],
-        limit_use=_limit_use(problem, trajectory.motion(LIMIT_SAMPLES)),
+        limit_use=limit_use(problem, trajectory.motion(LIMIT_SAMPLES)),
     )
 
 
-def _limit_use(problem: ExcitationProblem, motion: Motion) -> dict[str, float]:
-    """Largest share used of each kind of limit."""
-    lowest, highest, speed, acceleration = peaks(motion)[0]
-    low, high = np.array([limit.position for limit in problem.constraints.limits]).T
-    middle, half = (low + high) / 2, (high - low) / 2
-    use = {
-        "position": np.maximum(highest - middle, middle - lowest) / half,
-        "speed": speed / [limit.velocity for limit in problem.constraints.limits],
-        "acceleration": acceleration / [limit.acceleration for limit in problem.constraints.limits],
-    }
-    return {name: float(np.max(share)) for name, share in use.items()}
-
-
 def write_published(results: Path, records: Path, config: Path = CONFIG_FILE, plan: Path = PLAN_FILE) -> Iterator[Path]:
-    """Write published.md into the folder `results`, beside the records of a file; yields the file."""
+    """Write published.md into the folder `results`, beside the records of a file, and records.md; yields the files."""
     trajectories, judgements = judge_published(config, plan, records)
     page = markdown_page(
         "Published trajectories beside the best known",
@@ -172,6 +160,8 @@ def write_published(results: Path, records: Path, config: Path = CONFIG_FILE, pl
     results.mkdir(parents=True, exist_ok=True)
     write_whole(results / PAGE_FILE, page)
     yield results / PAGE_FILE
+    write_whole(results / RECORDS_PAGE, records_page(records))
+    yield results / RECORDS_PAGE
 
 
 _INTRODUCTION = """Excitation trajectories whose coefficients are public, recomputed under one convention: base
@@ -180,16 +170,19 @@ of the problem. *Best known*: the record of the problem (10 s, five harmonics). 
 series of the trajectory's own duration and number of harmonics; where the trajectory begins and ends at rest, so does
 the series. Limits are checked at 2,001 instants; the table has the largest share that is used of each kind.
 
-The sources planned for their own cells, limits and criteria; the records know no obstacles and no collisions of the arm
-with itself. The ratios say what these limits leave possible, not who searched better."""
+The sources planned for their own cells, limits and criteria; these records know no obstacles and no collisions of the
+arm with itself (those of suite 4 do: records.md). The ratios say what these limits leave possible, not who searched
+better."""
 
 _LOOKED_AT = """## Looked at, and not recomputed
 
 For the LBR iiwa, the Stäubli TX40, the KUKA KR300 and the ABB IRB 120 no coefficients were found as text.
 github.com/halpersim/parameter_identification (iiwa) has its coefficients in MATLAB files, which could not be read here.
-github.com/nepfaff/robot_payload_id (iiwa 7), github.com/lbr-stack/dynamic_parameter_identification (LBR Med 7) and
-github.com/TUM-ICS/BIRDy (TX40) have programs that compute some, github.com/JonasWeigand/Robot_Identification (KR300)
-has samples of motions. github.com/thanhndv212/figaroh-examples has points of a spline for a simulated UR10."""
+github.com/nepfaff/robot_payload_id (iiwa 7) and github.com/TUM-ICS/BIRDy (TX40) have programs that compute some,
+github.com/JonasWeigand/Robot_Identification (KR300) has samples of motions. The log src/record.txt of
+github.com/lbr-stack/dynamic_parameter_identification (LBR Med 7, with collisions) has coefficients of a few runs, but
+not their base frequency, and its program adds the sines alone. github.com/thanhndv212/figaroh-examples has points of a
+spline for a simulated UR10. So no published motion that keeps off itself could be recomputed."""
 
 
 def _table(judgements: list[Judgement]) -> str:

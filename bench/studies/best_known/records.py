@@ -65,10 +65,10 @@ METHODS_FROM_SCRATCH = ("cma-es", "gradient")
 class Record(Settings):
     """The best trajectory known for one problem.
 
-    settings: of the problem, in full. value: its condition number. coefficients: the point by the names of its
-    coordinates. method, seed, start: the search that found it. evaluations, gradients: sum over all starts so far.
-    versions: of the packages that found it. ends: by method the values at which the starts ended, in order; null for an
-    infeasible one.
+    settings: of the problem, in full. value: its condition number, or for D-optimality det(W'W)^(-1/n). coefficients:
+    the point by the names of its coordinates. method, seed, start: the search that found it. evaluations, gradients:
+    sum over all starts so far. versions: of the packages that found it. ends: by method the values at which the starts
+    ended, in order; null for an infeasible one.
     """
 
     settings: dict[str, Any]
@@ -137,12 +137,20 @@ def record_key(settings: ProblemSettings) -> str:
 
 
 def records_by_problem(path: Path) -> dict[str, Record]:
-    """Records of a file by the key of their problem."""
-    records = read_records(path)
-    return {
-        record_key(parse_problem(_record_settings(record), f"{path}, '{name}'")): record
-        for name, record in records.items()
-    }
+    """Records of condition numbers in a file, by the key of their problem."""
+    parsed = {name: (parse_record(record, name, path), record) for name, record in read_records(path).items()}
+    return {record_key(settings): record for settings, record in parsed.values() if not is_d_optimal(settings)}
+
+
+def parse_record(record: Record, name: str, path: Path) -> ProblemSettings:
+    """The settings of a record's problem; raises InputError, in one line, for a mistake in them."""
+    return parse_problem(record.settings, f"{path}, '{name}'")
+
+
+def is_d_optimal(settings: ProblemSettings) -> bool:
+    """Whether a problem asks for D-optimality in place of the condition number."""
+    criterion = getattr(settings, "criterion", None)
+    return criterion is not None and criterion.kind == "d_optimality"
 
 
 def gap_to_best_known(settings: ProblemSettings, value: float, known: dict[str, Record]) -> float | None:
@@ -152,10 +160,6 @@ def gap_to_best_known(settings: ProblemSettings, value: float, known: dict[str, 
     """
     record = known.get(record_key(settings))
     return None if record is None else value / record.value - 1
-
-
-def _record_settings(record: Record) -> dict[str, Any]:
-    return record.settings
 
 
 def best_known_values(entries: Sequence[Entry], records: Path) -> dict[str, float]:

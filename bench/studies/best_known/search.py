@@ -25,7 +25,7 @@ from armlab.common.streams import named_generator
 from bench.config import find_algorithm
 from bench.execute import canonical
 from bench.provenance import provenance
-from bench.studies.best_known.descent import SearchEnd, check_supported, descend, evaluate_point
+from bench.studies.best_known.descent import SearchEnd, check_supported, descend, evaluate_point, keep_limits
 from bench.studies.best_known.records import (
     RECORDS_FILE,
     Record,
@@ -37,13 +37,16 @@ from bench.studies.best_known.records import (
 )
 from problem.excitation import ExcitationProblem
 from problem.fitness import Criterion
+from problem.safe_motion import SafeConstraints
 
 METHOD_TURNS = ("cma-es", "gradient", "kick", "cma-es", "kick", "kick")  # one after the other
+METHOD_TURNS_WITH_COLLISIONS = ("gradient", "kick", "kick")  # the same where a population is dear
 METHOD_TURNS_WITHOUT_DERIVATIVES = ("cma-es", "kick")  # the same where there are no derivatives
 EVALUATIONS_WITHOUT_DERIVATIVES = 10_000  # of such a start: these problems are dear
 RANDOM_DRAWS = 200  # random points, the best of which is a start
 POPULATION, DOUBLINGS = 25, 4  # of CMA-ES: doubled from one restart to the next (Auger and Hansen 2005), then anew
 CMAES_GENERATIONS = 600  # generations
+SWING_RANGE = (0.25, 1.0)  # of random points with collisions: at 1 none of 300 of the TX40 is clear, at 0.5 a fifth
 KICK_RANGE = (0.05, 0.6)  # range of their standard deviations, in halves of the box
 KICKED_POINTS = 4  # kicked points, the best of which is a start: of more, the best would be the least moved one
 
@@ -62,13 +65,19 @@ class SearchStart:
         box = Box(problem.lower, problem.upper)
         if not problem.spectral:
             return self._run_without_derivatives(problem, box, best, rng)
-        plain = _without_criterion(problem)
-        turn = METHOD_TURNS[self.number % len(METHOD_TURNS)]
+        turns: Sequence[str] = METHOD_TURNS
+        if isinstance(problem.constraints, SafeConstraints):
+            turns = METHOD_TURNS_WITH_COLLISIONS
+        plain = _with_smooth_criterion(problem)
+        turn = turns[self.number % len(turns)]
         if turn == "cma-es":
             return turn, self._evolve_and_descend(plain, box, rng)
         if turn == "kick" and best is not None:
             return turn, self.descend_from_kick(problem, best)
-        return "gradient", _descend_from_best_of(plain, uniform_points(RANDOM_DRAWS, box, rng))
+        points = uniform_points(RANDOM_DRAWS, box, rng)
+        if isinstance(problem.constraints, SafeConstraints):
+            points = keep_limits(problem, _shrink_swings(problem, points, rng.uniform(*SWING_RANGE, RANDOM_DRAWS)))
+        return "gradient", _descend_from_best_of(plain, points)
 
     def descend_from_kick(self, problem: ExcitationProblem, best: Array) -> SearchEnd:
         """The end of a descent from the surroundings of the best known point (dimension,)."""
@@ -76,7 +85,7 @@ class SearchStart:
         spread = np.exp(rng.uniform(*np.log(KICK_RANGE))) * (problem.upper - problem.lower) / 2
         touched = rng.random((KICKED_POINTS, len(best))) < rng.random((KICKED_POINTS, 1))  # few numbers or many
         points = best + spread * touched * rng.normal(size=(KICKED_POINTS, len(best)))
-        return _descend_from_best_of(_without_criterion(problem), np.clip(points, problem.lower, problem.upper))
+        return _descend_from_best_of(_with_smooth_criterion(problem), np.clip(points, problem.lower, problem.upper))
 
     def _run_without_derivatives(
         self, problem: ExcitationProblem, box: Box, best: Array | None, rng: np.random.Generator
@@ -115,13 +124,19 @@ def _run_cmaes(
     return _add_evaluations(evaluate_point(problem, found.best_x), found.evaluations - 1)
 
 
-def _without_criterion(problem: ExcitationProblem) -> ExcitationProblem:
-    """The same problem, where the fitness is the condition number and the penalty alone."""
-    return replace(problem, criterion=Criterion("eq44"))
+def _with_smooth_criterion(problem: ExcitationProblem) -> ExcitationProblem:
+    """The same problem, where the fitness is the condition number, or D-optimality, and the penalty alone."""
+    return problem if problem.criterion.kind == "d_optimality" else replace(problem, criterion=Criterion("eq44"))
 
 
 def _descend_from_best_of(plain: ExcitationProblem, points: Array) -> SearchEnd:
     return _add_evaluations(descend(plain, points[np.argmin(plain.evaluate(points).fitness)]), len(points))
+
+
+def _shrink_swings(problem: ExcitationProblem, points: Array, shares: Array) -> Array:
+    """Points (points, dimension) whose swings about q0 have a share (points,) of their size."""
+    swings = np.array([not name.startswith("q0") for name in problem.trajectory.names])
+    return np.where(swings, shares[:, None] * points, points)
 
 
 def _add_evaluations(end: SearchEnd, evaluations: int) -> SearchEnd:
