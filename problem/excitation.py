@@ -95,8 +95,6 @@ class ExcitationProblem:
     @property
     def no_derivatives_because(self) -> str:
         """Why there are no derivatives; empty where there are."""
-        if not self.spectral:
-            return "its value is no function of the singular values"
         if any(np.isfinite(limit.torque) for limit in self.constraints.limits):
             return "derivatives of a torque limit are not known"
         return "derivatives of a workspace limit are not known" if self.constraints.workspace.limited else ""

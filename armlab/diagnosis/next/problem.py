@@ -11,9 +11,11 @@ from annotated_types import Ge, Gt
 from pydantic import AfterValidator, Field
 
 from armlab.common.arrays import Array
+from armlab.common.derivatives import Derivatives, Question
 from armlab.common.errors import DataError, InputError
 from armlab.common.settings import Settings
 from armlab.diagnosis.next.decision import decision_strength
+from armlab.diagnosis.next.derivative import strength_slope
 from armlab.diagnosis.next.moments import DesignMoments
 from armlab.diagnosis.next.motion import Budget, build_excitation_problem
 from armlab.diagnosis.next.prepare import LinkKnowledge, PreparedQuestions, prepare_questions
@@ -25,8 +27,10 @@ from problem.excitation import ExcitationProblem, ShiftedProblem, shift_randomly
 from problem.motion import Motion
 from problem.presets import LimitSettings, PerJoint, Positive, per_joint_values
 from problem.robot_file import load_arm
+from problem.safe_motion import SafeConstraints
 
 MIN_STRENGTH = 1e-6  # standard errors: avoids a division by zero
+STEP_SHARE = 1e-7  # of the box: of the differences along its coordinates
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -47,6 +51,39 @@ class TellApartProblem(ExcitationProblem):
         """How well the motion of a point (dimension,) decides, standard errors."""
         motion = self.trajectory.motions(point[None], self.times).motion
         return self._strength(motion.select(np.intp(0)))
+
+    @property
+    def no_derivatives_because(self) -> str:
+        """Why there are no derivatives; empty where there are."""
+        if isinstance(self.constraints, SafeConstraints):
+            return "derivatives of distances are not known for its motions"
+        if any(np.isfinite(limit.torque) for limit in self.constraints.limits):
+            return "derivatives of a torque limit are not known"
+        return ""
+
+    def differentiate(self, point: Array, question: Question) -> Derivatives:
+        """The logarithm of a point's value and its derivatives; limits are kept by every point (dimension,).
+
+        The inner fits are those at the point (`armlab.diagnosis.next.derivative`); the columns of the moved motions,
+        one for each coordinate, are differences. sharpness does not matter: the value is smooth but for its kinks.
+        """
+        step = STEP_SHARE * (self.upper - self.lower)
+        motions = self.trajectory.motions(np.vstack([point, point + np.diag(step)]), self.times).motion
+        scene, *moved = (
+            self.prepared.present.scene(motions.select(np.intp(number)), self.times)
+            for number in range(len(motions.position))
+        )
+        layout, sampling = self.prepared.layout, self.prepared.sampling
+        keep = sampling.filter(len(self.times))
+        rows = layout.rows(scene, keep, sampling)
+        gram = self.prepared.total_gram(self.prepared.learned_share * rows.T @ rows)
+        strength, by_gram = strength_slope(self.prepared.questions, gram, self.rows)
+        by_row = 2 * self.prepared.learned_share * rows @ by_gram
+        changes = np.array([np.sum(by_row * layout.row_changes((scene, each), keep, sampling)) for each in moved])
+        value = np.inf if strength < MIN_STRENGTH else -np.log(strength)
+        slope = -changes / step / max(strength, MIN_STRENGTH)
+        nothing = np.zeros(0, dtype=np.intp)
+        return Derivatives(value, slope, np.empty(0), nothing, np.empty((0, len(point))))
 
     @property
     def rows(self) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.next.moments import ROUNDING_SHARE, DesignMoments, Index, unexplained_power
-from armlab.diagnosis.next.sampling import Sampling, kept_columns
+from armlab.diagnosis.next.sampling import Sampling, column_changes, kept_columns
 from armlab.effects.contract import Candidate, Effect, Scene
 from armlab.effects.library import effect_named
 from armlab.recordings.filters import Butterworth
@@ -159,9 +159,18 @@ class Layout:
 
     def moments(self, scene: Scene, keep: Butterworth, sampling: Sampling) -> DesignMoments:
         """Moments of a motion whose torque is not recorded yet: the vector is zero."""
-        columns = kept_columns(self.base, self.candidates, scene, keep, smooth=True)
-        rows = sampling.whiten(columns, scene.motion.velocity)
+        rows = self.rows(scene, keep, sampling)
         return DesignMoments(rows.T @ rows, np.zeros(self.size))
+
+    def rows(self, scene: Scene, keep: Filter, sampling: Sampling) -> Array:
+        """Whitened rows of a motion, (rows of all joints, columns)."""
+        columns = kept_columns(self.base, self.candidates, scene, keep, smooth=True)
+        return sampling.whiten(columns, scene.motion.velocity)
+
+    def row_changes(self, scenes: tuple[Scene, Scene], keep: Filter, sampling: Sampling) -> Array:
+        """By how much the same rows change from one scene to another one very near; weights stay those of the first."""
+        columns = column_changes(self.base, self.candidates, scenes, keep)
+        return sampling.whiten(columns, scenes[0].motion.velocity)
 
 
 def build_layout(base: BaseParameters, candidates: list[Candidate], scene: Scene, prior: Array) -> Layout:

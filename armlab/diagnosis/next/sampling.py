@@ -108,10 +108,43 @@ def kept_columns(
 
     smooth: the motion is far below the cut-off, so that the filter would leave the rigid columns as they are.
     """
-    joints = len(scene.arm)
-    rigid = observation_matrix(scene.arm, scene.motion)[:, base.columns].reshape(len(scene.time), joints, -1)
+    return _keep_columns(
+        _rigid_columns(base, scene), [each.columns(scene) for each in candidates], candidates, keep, smooth
+    )
+
+
+MAX_CHANGE = 1e-3  # of a column's largest entry, for a motion that is changed by far less: more is a jump of a sign
+
+
+def column_changes(
+    base: BaseParameters, candidates: tuple[Candidate, ...], scenes: tuple[Scene, Scene], keep: Filter
+) -> Array:
+    """By how much the same columns change from one scene to another one very near: (rows, joints, columns).
+
+    Where the sign of a velocity jumps at a sample, its entry does not count: almost everywhere its derivative is zero.
+    """
+    before, after = scenes
+    own = []
+    for candidate in candidates:
+        column = candidate.columns(before)
+        change = candidate.columns(after) - column
+        own.append(np.where(np.abs(change) > MAX_CHANGE * np.abs(column).max(initial=0.0), 0.0, change))
+    rigid = _rigid_columns(base, after) - _rigid_columns(base, before)
+    return _keep_columns(rigid, own, candidates, keep, smooth=True)
+
+
+def _rigid_columns(base: BaseParameters, scene: Scene) -> Array:
+    """The base parameters' columns, (samples, joints, columns)."""
+    whole = observation_matrix(scene.arm, scene.motion)[:, base.columns]
+    return np.asarray(whole.reshape(len(scene.time), len(scene.arm), -1))
+
+
+def _keep_columns(
+    rigid: Array, own: list[Array], candidates: tuple[Candidate, ...], keep: Filter, smooth: bool
+) -> Array:
+    """Rigid columns (samples, joints, columns) and those of candidates, at the kept rows."""
+    joints = rigid.shape[1]
     out = [rigid[keep.rows] if smooth else keep(rigid)]
-    own = [candidate.columns(scene) for candidate in candidates]
     flat = keep(np.concatenate([each.reshape(len(each), -1) for each in own], axis=1)) if own else np.empty((0, 0))
     at = 0
     for candidate, each in zip(candidates, own, strict=True):
