@@ -7,10 +7,11 @@ import os
 import random
 from collections import deque
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from queue import SimpleQueue
 
 from bench.execute import Failure, Trial
 from bench.executors.contract import BatchExecutor, Work, WorkReport
@@ -145,22 +146,24 @@ def stream_reports(
     is split into its trials. A trial with which a worker dies alone is reported as a failure; all others get their
     outcome.
     """
-    queue = _BatchQueue(batches)
+    queue, done = _BatchQueue(batches), SimpleQueue[Future[WorkReport]]()  # in order; a wait for all looks at each
     under_way: dict[Future[WorkReport], Work] = {}
     while True:
         while len(under_way) < executor.slots and (work := queue.next(under_way.values())) is not None:
-            under_way[executor.submit(work)] = work
+            future = executor.submit(work)
+            under_way[future] = work
+            future.add_done_callback(done.put)
         if not under_way:
             return
-        for future in wait(under_way, return_when=FIRST_COMPLETED).done:
-            work = under_way.pop(future)
-            try:
-                report = future.result()
-            except executor.crashes:
-                report = _handle_crash(work, queue, timeout_s)
-            else:
-                queue.mark_settled(work)
-            yield report
+        future = done.get()
+        work = under_way.pop(future)
+        try:
+            report = future.result()
+        except executor.crashes:
+            report = _handle_crash(work, queue, timeout_s)
+        else:
+            queue.mark_settled(work)
+        yield report
 
 
 def _handle_crash(work: Work, queue: _BatchQueue, timeout_s: float | None) -> WorkReport:

@@ -103,19 +103,22 @@ def intervals(results: Path) -> ResultLines:
 @click.command()
 @click.option("--trials", type=click.IntRange(min=1), default=100_000, show_default=True)
 @click.option("--kills", type=click.IntRange(min=1), help="Kill the command and its workers that many times instead.")
+@click.option("--workers", type=click.IntRange(min=1), help="Simulate that many Dask workers in one process instead.")
 @click.option("--results", type=OutputPath(), default=Path("results/speed"), show_default=True)
 @click.pass_context
-def scale(context: click.Context, trials: int, kills: int | None, results: Path) -> None:
+def scale(context: click.Context, trials: int, kills: int | None, workers: int | None, results: Path) -> None:
     """Measure memory, overhead and efficiency of large sweeps.
 
     Writes scale.md. With --kills: kills processes at random times and writes kills.md; exit code 1 if an outcome
-    was lost.
+    was lost. With --workers: writes cluster.md.
     """
-    from bench.studies.scale.report import write_kills, write_scale
+    from bench.studies.scale.report import write_cluster, write_kills, write_scale
 
     configs, unharmed = Path("configs"), True
     if kills:
         page, unharmed = write_kills(configs, kills, results, _print_progress)
+    elif workers:
+        page = write_cluster(configs, workers, results, _print_progress)
     else:
         page = write_scale(configs, trials, results, _print_progress)
     click.echo(page)

@@ -1,5 +1,6 @@
 """The executor on a Dask cluster; needs the extra `cluster`."""
 
+import time
 from collections.abc import Iterator
 from concurrent.futures import Executor as Pool
 from concurrent.futures import Future
@@ -7,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from distributed import Client, KilledWorker, LocalCluster
 
 from armlab.common.errors import InputError
@@ -14,20 +16,31 @@ from bench.executors.contract import BatchExecutor, Work, WorkReport, run_in_wor
 
 _BATCHES_PER_WORKER = 2  # batches a worker, so that none waits for the next one
 _CONNECT_TIMEOUT_S = 30
+_COUNT_INTERVAL_S = 5.0  # between two counts of the workers
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class DaskExecutor:
     """Batches through the client's own pool of futures.
 
     If a worker dies, Dask itself gives its batch to another one. It reports a crash after as many dead workers as the
-    scheduler allows.
+    scheduler allows. Workers may join at any time, as the jobs of a queue begin: they are counted again and again.
     """
 
+    client: Any
     pool: Pool
-    slots: int
+    address: str | None
     timeout_s: float | None
     crashes: tuple[type[BaseException], ...] = (KilledWorker,)
+    counted: int = 0
+    counted_at: float = -np.inf
+
+    @property
+    def slots(self) -> int:
+        """Batches for all workers that are there; raises InputError if one has several threads."""
+        if time.monotonic() - self.counted_at > _COUNT_INTERVAL_S:
+            self.counted, self.counted_at = _count_workers(self.client, self.address), time.monotonic()
+        return _BATCHES_PER_WORKER * max(self.counted, 1)
 
     def submit(self, work: Work) -> "Future[WorkReport]":
         return self.pool.submit(run_in_worker, list(work), self.timeout_s)
@@ -40,14 +53,19 @@ def dask_executor(address: str | None, workers: int, timeout_s: float | None) ->
     Raises InputError if no cluster answers, or if its workers have several threads.
     """
     with _connect_client(address, workers) as client:
-        threads = client.nthreads()
-        if any(count > 1 for count in threads.values()):
-            raise InputError(
-                f"the Dask workers at {address} have several threads, and processor time is counted by process: "
-                "start them with `dask worker --nthreads 1 --nworkers N`"
-            )
+        _count_workers(client, address)
         with client.get_executor(pure=False) as pool:
-            yield DaskExecutor(pool, _BATCHES_PER_WORKER * len(threads), timeout_s)
+            yield DaskExecutor(client, pool, address, timeout_s)
+
+
+def _count_workers(client: Any, address: str | None) -> int:
+    threads = client.nthreads()
+    if any(count > 1 for count in threads.values()):
+        raise InputError(
+            f"the Dask workers at {address} have several threads, and processor time is counted by process: "
+            "start them with `dask worker --nthreads 1 --nworkers N`"
+        )
+    return len(threads)
 
 
 @contextmanager

@@ -2,8 +2,9 @@
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from armlab.common.files import write_whole
 from armlab.common.markdown import markdown_page, markdown_table
@@ -12,11 +13,21 @@ from bench.result_sets.formats import make_folder
 from bench.studies.scale.kills import KillResult, Victim, kill_repeatedly
 from bench.studies.scale.sweeps import ReportProgress, ScaleCost, SweepCost, measure_scale
 
+if TYPE_CHECKING:  # it needs the extra `cluster`
+    from bench.studies.scale.cluster import SimulatedCluster
+
 _SCALE_READING = """\
 Small trials on purpose: 50 evaluations of a function that costs microseconds, so that everything beside the searches
 shows. Memory: resident, of the command itself without its workers. Trials: seconds by the clock, without start and
 table, which the same command takes on the finished store. Searches: their processor time in sum. Overhead: what a trial
 costs beside its search, of one core: its key, its way to a worker and back, the store."""
+_CLUSTER_READING = """\
+Simulated: workers of `distributed` in one process with the scheduler and the command, each with its own connections
+by TCP and its heartbeat. Not simulated: processors of their own, a network, Slurm. Batches are one trial of 50
+evaluations, two a worker; a real batch has 20,000 evaluations, 400 such trials. *Dispatch*: what the command itself
+does for a batch, with twice as many batches under way as there are workers. *Through Dask*: the whole way of a
+batch, the trial included, on the one core that all workers share here: an upper bound of what scheduler and messages
+take. *Memory*, *open files*: of scheduler and all workers together, both ends of each connection."""
 _KILLS_READING = """\
 SIGKILL when a random share of the trials is kept, to the command (the driver, which is then started again) or to one
 of its two workers (which the command replaces). Lost: trials that were in the store when the kill was over and at the
@@ -33,6 +44,22 @@ def scale_page(scale: ScaleCost) -> str:
         _sweep_table([scale.tenth_sweep, scale.whole_sweep]),
         _scale_verdict(scale),
     )
+
+
+def cluster_page(clusters: "Sequence[SimulatedCluster]") -> str:
+    """The simulated clusters as a Markdown page."""
+    headings = ["", *(f"{each.workers:,} workers" for each in clusters)]
+    rows: dict[str, Callable[[SimulatedCluster], str]] = {
+        "until all are there, s": lambda each: f"{each.start_s:.1f}",
+        "the trial alone, ms": lambda each: f"{each.search_ms:.2f}",
+        "dispatch of a batch, ms": lambda each: f"{each.dispatch_ms:.2f}",
+        "a batch through Dask, ms": lambda each: f"{each.dask_ms:.1f}",
+        "memory, MB": lambda each: f"{each.memory_mb:.0f}",
+        "open files": lambda each: f"{each.files:,}",
+        "what broke": lambda each: each.failure or "nothing",
+    }
+    table = markdown_table(headings, [[name, *map(show, clusters)] for name, show in rows.items()])
+    return markdown_page("A cluster, simulated", _machine_text(), _CLUSTER_READING, table)
 
 
 def kills_page(kills: Mapping[str, Sequence[KillResult]]) -> str:
@@ -100,6 +127,17 @@ def write_scale(configs: Path, trials: int, results: Path, tell: ReportProgress)
     make_folder(results)
     write_whole(results / "scale.md", scale_page(measure_scale(configs / "scale.yaml", trials, tell)))
     return results / "scale.md"
+
+
+def write_cluster(configs: Path, workers: int, results: Path, tell: ReportProgress) -> Path:
+    """Simulate a hundredth, a tenth and the whole of that many Dask workers; write and return `cluster.md`."""
+    from bench.studies.scale.cluster import simulate_clusters  # needs the extra `cluster`
+
+    make_folder(results)
+    sizes = sorted({max(workers // share, 1) for share in (100, 10, 1)})
+    found = simulate_clusters(configs / "scale.yaml", sizes, tell)
+    write_whole(results / "cluster.md", cluster_page(found))
+    return results / "cluster.md"
 
 
 def write_kills(configs: Path, count: int, results: Path, tell: ReportProgress) -> tuple[Path, bool]:

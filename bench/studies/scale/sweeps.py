@@ -47,10 +47,10 @@ def watch_command(arguments: Sequence[object], folder: Path) -> WatchedCommand:
     """Run `armlab` with arguments in a folder to its end; raises CalledProcessError if it fails."""
     began = time.monotonic()
     running = start_command(arguments, folder)
-    memory = [_resident_mb(running.pid)]
+    memory = [resident_mb(running.pid)]
     while running.poll() is None:
         time.sleep(_POLL_INTERVAL_S)
-        memory.append(_resident_mb(running.pid) or memory[-1])
+        memory.append(resident_mb(running.pid) or memory[-1])
     seconds = time.monotonic() - began
     if running.returncode:
         raise subprocess.CalledProcessError(running.returncode, running.args)
@@ -63,7 +63,7 @@ def start_command(arguments: Sequence[object], folder: Path) -> "subprocess.Pope
     return subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL)
 
 
-def _resident_mb(pid: int) -> float:
+def resident_mb(pid: int) -> float:
     """Resident memory of a process, MB; 0 if it is gone. On Linux /proc has it."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
