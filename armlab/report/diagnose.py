@@ -5,12 +5,12 @@ from datetime import date
 
 from armlab.common.errors import DataError, InputError
 from armlab.diagnosis.changes import comparison as changes
-from armlab.diagnosis.motion.diagnose import diagnose_motion
+from armlab.diagnosis.motion.diagnose_motion import diagnose_motion
 from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.torque import diagnose as engine
 from armlab.recordings.given import GivenRecording, recording_of, torque_recording_of
 from armlab.recordings.motion import MotionRecording
-from armlab.report.motion.verdict import make_motion_verdict
+from armlab.report.motion.motion_verdict import make_motion_verdict
 from armlab.report.verdict import Verdict, verdict_of
 from armlab.report.verdict_files import make_verdict
 

@@ -22,7 +22,7 @@ from armlab.diagnosis.formats import (
     VerdictFile,
     read_verdict_file,
 )
-from armlab.diagnosis.motion.result import MotionDiagnosis
+from armlab.diagnosis.motion.motion_result import MotionDiagnosis
 from armlab.diagnosis.result import Diagnosis
 from armlab.identification.model import Model
 from armlab.identification.model_file import read_model_file
@@ -125,7 +125,7 @@ class Verdict:
 
     def _joint_charts(self) -> "dict[int, Chart]":
         """By the number of the joint, from 1; InputError for a verdict without signals."""
-        from armlab.report.motion.report import position_charts
+        from armlab.report.motion.motion_page import position_charts
         from armlab.report.torque.residuals import select_residuals
         from armlab.report.torque.torque_pictures import torque_charts
 

@@ -19,7 +19,7 @@ from servo_arms import arm_text, write_recording
 from armlab.cli.main import main
 from armlab.diagnosis.motion.robot_learning import isaac_lab_text
 from armlab.diagnosis.motion.servo import KEYS, NEUTRAL, Servos
-from armlab.diagnosis.motion.simulation import read_servo_simulation
+from armlab.diagnosis.motion.servo_simulation import read_servo_simulation
 from armlab.recordings.imports.files import import_files
 from armlab.recordings.imports.isaac_lab import read_isaac_lab
 from armlab.recordings.load import load_recording

@@ -14,7 +14,7 @@ from armlab.recordings.check import check_recording
 from armlab.recordings.imports.files import import_files
 from armlab.recordings.imports.plan import plan_import
 from armlab.recordings.motion import load_motion_recording
-from armlab.report.motion.write import diagnose_motion_recording
+from armlab.report.motion.motion_write import diagnose_motion_recording
 
 FILTERED = (
     '<general name="{joint}" joint="{joint}" dyntype="filter" dynprm="0.1" biastype="affine" gainprm="25" '

@@ -162,12 +162,12 @@ class Layout:
         rows = self.rows(scene, keep, sampling)
         return DesignMoments(rows.T @ rows, np.zeros(self.size))
 
-    def rows(self, scene: Scene, keep: Filter, sampling: Sampling) -> Array:
+    def rows(self, scene: Scene, keep: Butterworth, sampling: Sampling) -> Array:
         """Whitened rows of a motion, (rows of all joints, columns)."""
         columns = kept_columns(self.base, self.candidates, scene, keep, smooth=True)
         return sampling.whiten(columns, scene.motion.velocity)
 
-    def row_changes(self, scenes: tuple[Scene, Scene], keep: Filter, sampling: Sampling) -> Array:
+    def row_changes(self, scenes: tuple[Scene, Scene], keep: Butterworth, sampling: Sampling) -> Array:
         """By how much the same rows change from one scene to another one very near; weights stay those of the first."""
         columns = column_changes(self.base, self.candidates, scenes, keep)
         return sampling.whiten(columns, scenes[0].motion.velocity)

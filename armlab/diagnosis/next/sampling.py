@@ -117,7 +117,7 @@ MAX_CHANGE = 1e-3  # of a column's largest entry, for a motion that is changed b
 
 
 def column_changes(
-    base: BaseParameters, candidates: tuple[Candidate, ...], scenes: tuple[Scene, Scene], keep: Filter
+    base: BaseParameters, candidates: tuple[Candidate, ...], scenes: tuple[Scene, Scene], keep: Butterworth
 ) -> Array:
     """By how much the same columns change from one scene to another one very near: (rows, joints, columns).
 
@@ -140,7 +140,7 @@ def _rigid_columns(base: BaseParameters, scene: Scene) -> Array:
 
 
 def _keep_columns(
-    rigid: Array, own: list[Array], candidates: tuple[Candidate, ...], keep: Filter, smooth: bool
+    rigid: Array, own: list[Array], candidates: tuple[Candidate, ...], keep: Butterworth, smooth: bool
 ) -> Array:
     """Rigid columns (samples, joints, columns) and those of candidates, at the kept rows."""
     joints = rigid.shape[1]

@@ -18,7 +18,7 @@ from bench.studies.best_known.records import (
 from bench.studies.best_known.search import record_point
 from bench.studies.best_known.verify import Verification, limit_use_of_point, verify_motion
 from problem.excitation import ExcitationProblem
-from problem.fitness import Criterion, condition_number
+from problem.fitness import Criterion
 from problem.registry import ProblemSettings
 from problem.safe_motion import SafeConstraints
 from problem.trajectories import JointFourier
@@ -32,13 +32,13 @@ def record_cells(
     name: str, problem: ExcitationProblem, point: Array, verified: Verification, least_determinant: float | None
 ) -> list[str]:
     """The row of a trajectory without its author. least_determinant: of the problem, best known."""
-    values = problem.singular_values(problem.trajectory.motions(point[None], problem.times).motion)
-    determinant = float(np.exp(Criterion("d_optimality").value(values)[0]))
+    spectrum = problem.spectrum(problem.trajectory.motions(point[None], problem.times).motion)
+    determinant = float(np.exp(Criterion("d_optimality").value(spectrum)[0]))
     least = verified.safety.least if verified.safety is not None else {}
     distances = (least.get(kind) for kind in ("the arm itself", "the floor"))
     return [
         name,
-        f"{condition_number(values)[0]:.4g}",
+        f"{spectrum.condition_number[0]:.4g}",
         f"{determinant:.4g}",
         "-" if least_determinant is None else f"{least_determinant:.4g}",
         *(f"{verified.limit_use[kind]:.1%}" for kind in ("position", "speed", "acceleration")),

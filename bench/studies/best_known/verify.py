@@ -56,7 +56,7 @@ def limit_use_of_point(problem: ExcitationProblem, point: Array) -> dict[str, fl
 
 def limit_use(problem: ExcitationProblem, motion: Motion) -> dict[str, float]:
     """Largest share used of each kind of limit by a motion (1, samples, joints): half range, speed, acceleration."""
-    lowest, highest, speed, acceleration = peaks(motion)[0].T
+    lowest, highest, speed, acceleration = peaks(motion)[0]
     low, high = np.array([limit.position for limit in problem.constraints.limits]).T
     bounded = np.isfinite(high - low)
     middle, half = np.where(bounded, (low + high) / 2, 0.0), np.where(bounded, (high - low) / 2, np.inf)
