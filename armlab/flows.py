@@ -9,11 +9,13 @@ from armlab.common.errors import DataError, InputError
 from armlab.common.notebook import notebook_html
 from armlab.common.settings import suggest_name
 from armlab.effects.contract import Candidate
-from armlab.identification.identifier import METHODS, Identifier
+from armlab.identification.identifier import METHODS, USUAL_METHOD, Identifier
+from armlab.identification.identifier_choice import choose_identifier
 from armlab.identification.identify import robot_path, wrong_reading
 from armlab.identification.model import Model
 from armlab.identification.torque_model import TorqueModel
 from armlab.identification.validation import RunError, format_percent, run_error
+from armlab.recordings.cutoff_trial import choose_cutoff_hz
 from armlab.recordings.given import GivenRecording, torque_recording_of
 from armlab.recordings.identifiable import require_identifiable, require_possible, require_torque
 from armlab.recordings.recording import Recording
@@ -23,7 +25,7 @@ SHOWN = 4  # runs in a repr; the others are counted
 
 def identify(
     recording: GivenRecording,
-    method: str = "weighted",
+    method: str | None = None,
     *,
     components: tuple[Candidate, ...] | None = None,
     cutoff_hz: float | None = None,
@@ -31,15 +33,16 @@ def identify(
 ) -> Model:
     """The model of the arm that fits the runs with the role `identify`, with 95 % intervals.
 
-    recording: or the path of its folder. method: an estimator of `armlab identify --method`. components: viscous and
-    Coulomb friction, rotor inertia and offset at each joint if left out. cutoff_hz: of the low-pass, chosen from the
-    positions if left out. as_read: the recording and the robot file are not doubted. Raises InputError where no run
+    recording: or the path of its folder. method: an estimator of `armlab identify --method`; the one that predicts
+    best if left out. components: viscous and Coulomb friction, rotor inertia and offset at each joint if left out; with
+    others the method is `weighted` if left out. cutoff_hz: of the low-pass, the one that predicts best if left out.
+    as_read: the recording and the robot file are not doubted. Raises InputError where no run
     identifies, where the runs do not fit the arm, or where the recording is read wrongly.
 
         model = armlab.identify("my-recording")
         model.save("model.yaml")
     """
-    if method not in METHODS:
+    if method is not None and method not in METHODS:
         raise InputError(f"unknown method {method!r}: {suggest_name(method, list(METHODS))}")
     recording = torque_recording_of(recording)
     require_identifiable(recording)
@@ -48,8 +51,13 @@ def identify(
     if wrong is not None:
         raise InputError(f"{recording.name}: {wrong.sentence} `as_read=True` identifies it all the same")
     require_possible(recording)
-    identifier = Identifier(recording.arm, components, method, cutoff_hz=cutoff_hz, robot=robot_path(recording))
+    arm, robot = recording.arm, robot_path(recording)
     try:
+        cutoff = cutoff_hz or choose_cutoff_hz(arm, runs)
+        if method is None and components is None:
+            identifier = choose_identifier(arm, runs, cutoff, robot)
+        else:
+            identifier = Identifier(arm, components, method or USUAL_METHOD, cutoff_hz=cutoff, robot=robot)
         model = identifier.fit(runs).model_
     except DataError as error:
         raise InputError(f"{recording.name}: {error}") from None

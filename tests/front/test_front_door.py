@@ -10,8 +10,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import armlab
+from armlab.cli.main import main
 from armlab.diagnosis.result import Diagnosis
 from armlab.recordings.recording import Recording
 from problem.robot_file import load_arm
@@ -167,3 +169,13 @@ def test_a_comparison_names_effects_with_their_places(recording):
     assert repr(armlab.Comparison("inconclusive", (found, found), reason="Too short.")).endswith(
         "inconclusive\n  Too short."
     )
+
+
+def test_identify_is_what_the_command_does(recording_folder, tmp_path):
+    folder = tmp_path / "my-recording"
+    recording_folder(folder)
+    told = CliRunner().invoke(main, ["identify", str(folder), "--out", str(tmp_path / "out")])
+    assert told.exit_code == 0, told.output
+    stored, live = armlab.read_model(tmp_path / "out" / "model.yaml"), armlab.identify(folder)
+    assert (stored.cutoff_hz, stored.provenance["settings"]) == (live.cutoff_hz, live.provenance["settings"])
+    np.testing.assert_allclose(stored.values, live.values, rtol=1e-12)
