@@ -17,7 +17,7 @@ from armlab.common.errors import DataError
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.columns.columns import Block, Place, place_of
-from armlab.diagnosis.torque.columns.design import DesignMatrix, build_design_matrix
+from armlab.diagnosis.torque.columns.design import DesignMatrix, build_design_matrix, is_usable
 from armlab.diagnosis.torque.columns.solver import State
 from armlab.diagnosis.torque.rows.data import Observed, observe
 from armlab.diagnosis.torque.rows.noise import fit_noise
@@ -243,11 +243,7 @@ def _usual_beside(design: DesignMatrix, found: Sequence[Candidate]) -> list[Cand
 
 def _with_candidates(design: DesignMatrix, candidates: Sequence[Candidate]) -> DesignMatrix:
     blocks = (design.block(each, 0) for each in candidates)
-    return replace(design, blocks=tuple(each for each in blocks if _is_usable(each)))
-
-
-def _is_usable(block: Block) -> bool:
-    return bool(np.isfinite(block.values).all() and np.all(np.any(block.values != 0, axis=(0, 1))))
+    return replace(design, blocks=tuple(each for each in blocks if is_usable(each)))
 
 
 def _fit_common(design: DesignMatrix) -> FittedModel:
@@ -276,7 +272,7 @@ def _changing_blocks(model: FittedModel) -> Iterator[Block]:
     offered += [each for each in own if not each.facts.single_event and each.facts.where != "link"]
     for candidate in offered:
         block = design.block(candidate, 0)
-        if place_of(candidate) not in seen and _is_usable(block):
+        if place_of(candidate) not in seen and is_usable(block):
             seen.add(place_of(candidate))
             yield block
 

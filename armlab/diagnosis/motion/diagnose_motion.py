@@ -34,7 +34,7 @@ from armlab.diagnosis.motion.held_out import (
 )
 from armlab.diagnosis.motion.hold import hold_commands, holds_samples
 from armlab.diagnosis.motion.motion_result import MotionDiagnosis, ReplayError, ServoFinding, Status
-from armlab.diagnosis.motion.replay import Replayed, replay
+from armlab.diagnosis.motion.replay import replay, tool_rms
 from armlab.diagnosis.motion.second_thoughts import place_damping, with_stated_scale, without_worse
 from armlab.diagnosis.motion.servo import PARAMETERS
 from armlab.diagnosis.motion.servo_simulation import ServoSimulation, read_servo_simulation
@@ -220,7 +220,7 @@ class HeldOut:
             replayed_alone=np.column_stack(
                 [stretch_squares(*each, tuning) for each in zip(self.runs, servos.values, strict=True)]
             ),
-            tool=(_tool_error(before) if before else None, _tool_error(after)),
+            tool=(tool_rms(before) if before else None, tool_rms(after)),
             silent=tuple(
                 each.joint for each, own in zip(errors, chosen, strict=True) if own is None or not follows[each.joint]
             ),
@@ -275,11 +275,6 @@ def _that_help(
     findings = [each for each in findings if each.parameter.key == TOOL_MASS.key or follows[each.joint]]
     helped = {each.joint for each in errors if each.replay_before is None or each.replay_after < each.replay_before}
     return [each for each in findings if each.after < each.before and _is_at_one_of(each, helped)]
-
-
-def _tool_error(replayed: Sequence[Replayed]) -> float:
-    """Error of the tool over replayed runs, m."""
-    return float(np.sqrt(np.mean(np.concatenate([each.tool_distance for each in replayed]) ** 2)))
 
 
 def _is_at_one_of(finding: ServoFinding, joints: Set[int]) -> bool:

@@ -120,8 +120,8 @@ def write_observation(case: SimulatedCase, folder: Path) -> list[LoggedRun]:
     folder.mkdir(parents=True)
     for number, run in enumerate(runs, 1):
         _write_table(folder / f"run-{number}.parquet", run, case.plan.machine.joints)
-    _write_yaml(folder / "robot.yaml", case.plan.machine.settings())
-    _write_yaml(folder / "recording.yaml", _recording_settings(case, runs))
+    write_yaml(folder / "robot.yaml", case.plan.machine.settings())
+    write_yaml(folder / "recording.yaml", _recording_settings(case, runs))
     return runs
 
 
@@ -212,7 +212,8 @@ def _recording_settings(case: SimulatedCase, runs: list[LoggedRun]) -> dict[str,
     }
 
 
-def _write_yaml(path: Path, content: dict[str, Any]) -> None:
+def write_yaml(path: Path, content: dict[str, Any]) -> None:
+    """Writes a settings file of a recording folder, lists of numbers in one line."""
     path.write_text(yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110), encoding="utf-8")
 
 

@@ -7,11 +7,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from armlab.common.errors import DataError, InputError
 from armlab.proof.blind.case_files import write_observation
 from armlab.proof.blind.sealed import OBSERVATION, TRUTH_FILE, Score, SealedTier
 from armlab.proof.blind.setup.mistakes import Injected, inject
-from armlab.proof.blind.setup.setup_oracle import can_be_seen
+from armlab.proof.blind.setup.setup_oracle import is_seen
 from armlab.proof.blind.setup.setup_plan import PUBLIC, SetupCase, draw_cases, draw_mistakes, local_folder
 from armlab.proof.blind.setup.setup_score import score_setup
 from armlab.proof.blind.simulate import arm_with_effects
@@ -58,7 +57,7 @@ def _make(case: SetupCase, draft: Path) -> None:
     seen = []
     if mistakes:
         inject(wrong, mistakes, true_arm)
-        together = _is_seen(right, wrong)
+        together = is_seen(right, wrong)
         seen = [together and _is_seen_alone(right, draft, mistakes, place) for place in range(len(mistakes))]
     truth = {**asdict(case), "mistakes": [asdict(each) for each in mistakes], "seen": seen, "physics": physics}
     truth["arm_joints"] = len(arm)
@@ -84,14 +83,6 @@ def _is_seen_alone(right: Path, draft: Path, mistakes: tuple[Injected, ...], pla
     alone = draft / f"alone-{place}"
     shutil.copytree(right, alone)
     inject(alone, (mistakes[place],))
-    seen = _is_seen(right, alone)
+    seen = is_seen(right, alone)
     shutil.rmtree(alone)
     return seen
-
-
-def _is_seen(right: Path, wrong: Path) -> bool:
-    """Whether a recording as it stands can be told from itself read rightly; two mistakes may cancel each other."""
-    try:
-        return can_be_seen(load_recording(right), load_recording(wrong))
-    except (InputError, DataError):
-        return True  # a recording that cannot even be read is seen to be wrong

@@ -94,7 +94,7 @@ class DesignMatrix:
         arm, scenes = self.simulation.arm, self.scenes
         places = family.candidates(arm, scenes) if left is None else family.scan(arm, scenes, left)
         made = [self.block(each, at) for shapes in places for at, each in enumerate(shapes) if not each.second_name]
-        return [block for block in made if _is_usable(block)]
+        return [block for block in made if is_usable(block)]
 
     def scanned_again(self, left: Callable[[str], Sequence[Array]]) -> "DesignMatrix":
         """With more shapes from families that look at what a fit leaves: what was left before hid the best ones.
@@ -153,6 +153,6 @@ def _scene_of_run(signals: Signals, motion: Motion, simulation: Simulation, iner
     return replace(bare, inertial=inertial, torque=simulation.torque_in_mechanism(bare))
 
 
-def _is_usable(block: Block) -> bool:
+def is_usable(block: Block) -> bool:
     """Columns that are finite and not all zero: a joint that does not move has none."""
     return bool(np.isfinite(block.values).all() and np.all(np.any(block.values != 0, axis=(0, 1))))

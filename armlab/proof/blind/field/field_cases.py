@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from armlab.common.errors import DataError, InputError
 from armlab.proof.blind.field.field_hidden import (
     FIELD_CHANGES,
     FieldEffect,
@@ -21,7 +20,7 @@ from armlab.proof.blind.field.field_truth import FieldTruth, make_field_truth
 from armlab.proof.blind.field.files import write_field_observation
 from armlab.proof.blind.plan import random_stream
 from armlab.proof.blind.setup.mistakes import EFFECTS, draw_mistake, inject
-from armlab.proof.blind.setup.setup_oracle import can_be_seen
+from armlab.proof.blind.setup.setup_oracle import is_seen
 from armlab.recordings.load import load_recording
 
 SIDES = ("old", "new")
@@ -67,7 +66,7 @@ def _make_mistake(plan: FieldPlan, observation: Path) -> FieldTruth:
         shutil.rmtree(observation, ignore_errors=True)
         shutil.copytree(right, observation)
         inject(observation, (drawn,), case.arm)
-        made, seen = drawn, _is_seen(right, observation)
+        made, seen = drawn, is_seen(right, observation)
         if seen:
             break
     shutil.rmtree(right)
@@ -96,10 +95,3 @@ def _cycled(plan: FieldPlan, what: str, names: tuple[str, ...], attempt: int) ->
     """Each name comes once in a set before any comes twice; another one at a further attempt."""
     order: list[int] = random_stream("field order", what, plan.seed).permutation(len(names)).tolist()
     return names[order[(plan.index + 5 * attempt) % len(names)]]
-
-
-def _is_seen(right: Path, wrong: Path) -> bool:
-    try:
-        return can_be_seen(load_recording(right), load_recording(wrong))
-    except (InputError, DataError):
-        return True  # a recording that cannot even be read is seen to be wrong

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import yaml
 
 from armlab.common.arrays import Array
+from armlab.proof.blind.case_files import write_yaml
 from armlab.proof.blind.field.field_plan import FieldPlan
 from armlab.proof.blind.field.field_runs import FieldCase
 from armlab.recordings.recording import Role
@@ -64,8 +64,8 @@ def write_field_observation(case: FieldCase, folder: Path) -> list[FieldLog]:
             table.to_csv(path, index=False, float_format=f"%.{DIGITS}g", lineterminator="\n")
         else:
             table.to_parquet(path, index=False, compression="zstd")
-    _write_yaml(folder / "robot.yaml", _robot(case.plan))
-    _write_yaml(folder / "recording.yaml", _recording(case.plan, runs))
+    write_yaml(folder / "robot.yaml", _robot(case.plan))
+    write_yaml(folder / "recording.yaml", _recording(case.plan, runs))
     return runs
 
 
@@ -126,7 +126,3 @@ def _recording(plan: FieldPlan, runs: list[FieldLog]) -> dict[str, Any]:
         **({"gains": _gains(plan)} if plan.log.as_current else {}),
         "runs": [{"file": f"run-{number}{plan.log.suffix}", "role": run.role} for number, run in enumerate(runs, 1)],
     }
-
-
-def _write_yaml(path: Path, content: dict[str, Any]) -> None:
-    path.write_text(yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110), encoding="utf-8")

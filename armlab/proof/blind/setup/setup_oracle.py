@@ -6,12 +6,15 @@ zero of joint 1 under vertical gravity, for instance, cannot.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
 from armlab.common.arrays import Array
+from armlab.common.errors import DataError, InputError
 from armlab.recordings.differentiate import differentiate
+from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
 from problem.motion import Motion
 from problem.pseudo_inertia import entropic_information, regular_nominal
@@ -38,6 +41,14 @@ class SightSettings:
 
 
 SIGHT = SightSettings()
+
+
+def is_seen(right: Path, wrong: Path) -> bool:
+    """Whether a recording as it stands can be told from itself read rightly; two mistakes may cancel each other."""
+    try:
+        return can_be_seen(load_recording(right), load_recording(wrong))
+    except (InputError, DataError):
+        return True  # a recording that cannot even be read is seen to be wrong
 
 
 def can_be_seen(right: Recording, wrong: Recording) -> bool:
