@@ -74,9 +74,6 @@ class JointCoupling(Term):
         parts = self._parts(scene)
         return self._stacked(*(parts[name] for name in self.names))
 
-    def parameters(self, coefficients: Array) -> dict[str, Value]:
-        return dict(zip(self.names, coefficients.tolist(), strict=True))
-
     @property
     def size(self) -> int:
         return len(self.names)

@@ -73,20 +73,12 @@ class RotorInertia(Term):
     def columns(self, scene: Scene) -> Array:
         return self._stacked(scene.motion.acceleration[:, self.own])
 
-    def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """The inertia on the joint side."""
-        return {"inertia": float(coefficients[0])}
-
     def joint_fields(self, coefficients: Array) -> dict[str, float]:
         """`armature` of a simulator's joint."""
         return {"armature": float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
         return f"tau_{self.joint} += {format_number(coefficients[0])} qdd_{self.joint}"
-
-    @classmethod
-    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        return cls.at(arm, joints[0]), np.array([parameters["inertia"]])
 
 
 @dataclass(frozen=True)
@@ -160,15 +152,8 @@ class TorqueOffset(Term):
     def columns(self, scene: Scene) -> Array:
         return self._stacked(np.ones(len(scene.time)))
 
-    def parameters(self, coefficients: Array) -> dict[str, Value]:
-        return {"offset": float(coefficients[0])}
-
     def equation(self, coefficients: Array) -> str:
         return f"tau_{self.joint} += {format_number(coefficients[0])}"
-
-    @classmethod
-    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        return cls.at(arm, joints[0]), np.array([parameters["offset"]])
 
 
 @dataclass(frozen=True)

@@ -193,19 +193,12 @@ class CoulombFriction(Term):
     def columns(self, scene: Scene) -> Array:
         return self._stacked(direction_of_motion(scene, self.own))
 
-    def parameters(self, coefficients: Array) -> dict[str, Value]:
-        return {"level": float(coefficients[0])}
-
     def joint_fields(self, coefficients: Array) -> dict[str, float]:
         """`frictionloss` of a simulator's joint."""
         return {"frictionloss": float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
         return f"tau_{self.joint} += {format_number(coefficients[0])} sgn(qd_{self.joint})"
-
-    @classmethod
-    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        return cls.at(arm, joints[0]), np.array([parameters["level"]])
 
 
 @dataclass(frozen=True)
@@ -252,19 +245,12 @@ class ViscousFriction(Term):
     def columns(self, scene: Scene) -> Array:
         return self._stacked(scene.motion.velocity[:, self.own])
 
-    def parameters(self, coefficients: Array) -> dict[str, Value]:
-        return {"coefficient": float(coefficients[0])}
-
     def joint_fields(self, coefficients: Array) -> dict[str, float]:
         """`damping` of a simulator's joint."""
         return {"damping": float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
         return f"tau_{self.joint} += {format_number(coefficients[0])} qd_{self.joint}"
-
-    @classmethod
-    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        return cls.at(arm, joints[0]), np.array([parameters["coefficient"]])
 
 
 @dataclass(frozen=True)
@@ -464,10 +450,6 @@ class LevelsAndSlopes(Term):
         forwards, backwards = np.maximum(velocity, 0), np.minimum(velocity, 0)
         return self._stacked(*directions_apart(scene, self.own), forwards, backwards)
 
-    def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """A level and a slope each direction; positive where they brake."""
-        return dict(zip(self.names, coefficients.tolist(), strict=True))
-
     def unit(self, name: str) -> str:
         if name.endswith("slope"):
             return VISCOUS_COEFFICIENT.unit_for(self.kind)
@@ -488,10 +470,6 @@ class LevelsAndSlopes(Term):
                 return "friction that drives over a loop"
         return None
 
-    @classmethod
-    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        return cls.at(arm, joints[0]), np.array([float(parameters[name]) for name in cls.names])
-
 
 ASYMMETRIC = EveryJoint(ASYMMETRIC_FACTS, (Levels, Slopes, LevelsAndSlopes))
 
@@ -509,16 +487,9 @@ class LoadFriction(Term):
         load = np.abs(scene.rigid_torque[:, self.own])
         return self._stacked(load * direction_of_motion(scene, self.own))
 
-    def parameters(self, coefficients: Array) -> dict[str, Value]:
-        return {"coefficient": float(coefficients[0])}
-
     def equation(self, coefficients: Array) -> str:
         own = self.joint
         return f"tau_{own} += {format_number(coefficients[0])} |tau_rigid_{own}| sgn(qd_{own})"
-
-    @classmethod
-    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        return cls.at(arm, joints[0]), np.array([parameters["coefficient"]])
 
 
 LOAD_DEPENDENT = EveryJoint(LOAD_DEPENDENT_FACTS, (LoadFriction,))

@@ -161,15 +161,8 @@ class EncoderOffset(Term):
         change[0, :, self.joints[0] - 1] = -1.0
         return directional_derivative(scene, Motion(*change))[:, :, None]
 
-    def parameters(self, coefficients: Array) -> dict[str, Value]:
-        return {"offset": float(coefficients[0])}
-
     def equation(self, coefficients: Array) -> str:
         return f"q_{self.joint} = {format_less('recorded', coefficients[0])}"
-
-    @classmethod
-    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        return cls.at(arm, joints[0]), np.array([parameters["offset"]])
 
 
 @dataclass(frozen=True)
@@ -198,15 +191,8 @@ class GeometryError(Term):
         """Derivative of the rigid torque by the error."""
         return geometry_derivative(scene, self.joints[0] - 1, self.changed)[:, :, None]
 
-    def parameters(self, coefficients: Array) -> dict[str, Value]:
-        return {"offset": float(coefficients[0])}
-
     def equation(self, coefficients: Array) -> str:
         return f"{self.what}_{self.joint} += {format_number(coefficients[0])} {self.unit('offset')}"
-
-    @classmethod
-    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        return cls.at(arm, joints[0]), np.array([parameters["offset"]])
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,5 @@
 """What most effects share: a place at one joint, units of the vocabulary, positive parameters."""
 
-from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
@@ -42,10 +41,14 @@ class Term(Candidate):
         """The effect at a joint with each shape worth a first look."""
         return [cls.at(arm, joint)]
 
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """The coefficients by their names; laws of which other numbers are told say so."""
+        return dict(zip(self.names, coefficients.tolist(), strict=True))
+
     @classmethod
-    @abstractmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
         """The effect and the coefficients that have these parameters."""
+        return cls.at(arm, joints[0]), np.array([float(parameters[name]) for name in cls.names])
 
     @property
     def own(self) -> int:

@@ -64,10 +64,6 @@ class LateTorque(Term):
         torque, shift = scene.torque[:, list(self.rows)], self.shape[0]
         return ((delay_signal(scene, torque, shift) - torque) / shift)[:, :, None]
 
-    def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """Seconds, positive where torque lags."""
-        return {"seconds": float(coefficients[0])}
-
     @classmethod
     def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
         """Both signs: at a jump of friction they differ."""
@@ -136,16 +132,8 @@ class PositionSkew(Term):
         column[:, index] += (delay_signal(scene, friction, SHIFTS[0]) - friction) / SHIFTS[0]
         return column[:, :, None]
 
-    def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """Seconds, positive where torque lags behind this position."""
-        return {"seconds": float(coefficients[0])}
-
     def equation(self, coefficients: Array) -> str:
         return f"q_{self.joint}(t) = q_recorded_{self.joint}({format_less('t', coefficients[0], 's')})"
-
-    @classmethod
-    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        return cls.at(arm, joints[0]), np.array([parameters["seconds"]])
 
 
 @dataclass(frozen=True)

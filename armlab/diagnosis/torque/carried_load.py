@@ -4,10 +4,8 @@ Nobody has recorded the arm without the load, so what else the robot file lacks 
 model is that of `armlab diagnose`; in the place of bodies that it adds there is one at the link that carries the load.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Self
 
 import numpy as np
 
@@ -22,7 +20,7 @@ from armlab.diagnosis.torque.evidence.added_body import body_groups, fit_body, p
 from armlab.diagnosis.torque.names.intervals import extend_with_shapes
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, Progress
 from armlab.diagnosis.torque.stages import find_names
-from armlab.effects.contract import Candidate, Value
+from armlab.effects.contract import Candidate
 from armlab.effects.links import (
     MAX_CENTRE_M,
     PAYLOAD_FACTS,
@@ -76,15 +74,8 @@ class MassAtPoint(LinkTerm):
         """A point mass about the link's frame."""
         return float(coefficients[0]) * unit_mass_at(self.centre)
 
-    def parameters(self, coefficients: Array) -> dict[str, Value]:
-        return {"mass": float(coefficients[0])}
-
     def equation(self, coefficients: Array) -> str:
         return f"link {self.link} carries {format_number(coefficients[0])} kg"
-
-    @classmethod
-    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        return cls.at(arm, joints[0]), np.array([parameters["mass"]])
 
 
 @dataclass(frozen=True)
