@@ -1,13 +1,13 @@
 """A push during a stretch of time, in one run."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import TORQUE, Candidate, Effect, Family, Parameter, Scene, Value
-from armlab.effects.term import Term, form_from_parameters, format_number
+from armlab.effects.contract import TORQUE, Candidate, Effect, Parameter, Scene, Value
+from armlab.effects.term import Term, TermFamily, format_number
 from problem.arm import Arm
 
 EXTERNAL_CONTACT_FACTS = Effect(
@@ -84,10 +84,11 @@ class Push(Contact):
 
 
 @dataclass(frozen=True)
-class ContactFamily(Family):
+class ContactFamily(TermFamily):
     """A place is a joint in a run."""
 
     facts: Effect = EXTERNAL_CONTACT_FACTS
+    terms: tuple[type[Term], ...] = (Contact,)
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
         """Half sines of three durations that overlap by half, thinned to WINDOWS: use `scan` for all of them."""
@@ -112,12 +113,6 @@ class ContactFamily(Family):
                     [replace(_contact_between(form, arm, joint, scene, *ends), looks=looks) for form, *ends in forms]
                 )
         return found
-
-    def from_parameters(
-        self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
-    ) -> tuple[Candidate, Array]:
-        """ValueError: a push belongs to one run."""
-        return form_from_parameters((Contact,), arm, joints, parameters, "")
 
 
 def _contact_between(form: type[Contact], arm: Arm, joint: int, scene: Scene, start: float, end: float) -> Contact:

@@ -14,13 +14,11 @@ from armlab.effects.contract import (
     VISCOUS_COEFFICIENT,
     Candidate,
     Effect,
-    Family,
     Parameter,
     Scene,
-    Value,
 )
 from armlab.effects.friction import direction_of_motion
-from armlab.effects.term import Term, form_from_parameters, format_sum, joint_moves
+from armlab.effects.term import Term, TermFamily, format_sum, joint_moves
 from problem.arm import Arm
 
 JOINT_COUPLING_FACTS = Effect(
@@ -144,20 +142,16 @@ COUPLING_FORMS = (ViscousCoupling, CoulombCoupling, InertiaCoupling, FrictionCou
 
 
 @dataclass(frozen=True)
-class CouplingFamily(Family):
+class CouplingFamily(TermFamily):
     """Neighbours both ways, and all pairs of a wrist."""
 
     facts: Effect = JOINT_COUPLING_FACTS
+    terms: tuple[type[Term], ...] = COUPLING_FORMS
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
         """Each term alone and their groups, for each pair of which the driving joint moves."""
         pairs = [(own, other) for own, other in neighbour_pairs(len(arm)) if joint_moves(scenes, other)]
         return [[form.between(arm, own, other)] for own, other in pairs for form in COUPLING_FORMS]
-
-    def from_parameters(
-        self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
-    ) -> tuple[Candidate, Array]:
-        return form_from_parameters(COUPLING_FORMS, arm, joints, parameters, form)
 
 
 def neighbour_pairs(joints: int) -> list[tuple[int, int]]:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import ANGLE, Candidate, Effect, Family, Parameter, Range, Scene, Value
+from armlab.effects.contract import ANGLE, Candidate, Effect, Parameter, Range, Scene, Value
 from armlab.effects.sensitivity import (
     GEOMETRY_STEP,
     directional_derivative,
@@ -16,7 +16,7 @@ from armlab.effects.sensitivity import (
     gravity_derivative,
     horizontal_directions,
 )
-from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_less, format_number
+from armlab.effects.term import EveryJoint, Term, TermFamily, format_less, format_number
 from problem.arm import Arm, Joint
 from problem.motion import Motion
 from problem.transforms import rotation_x, translation
@@ -122,18 +122,14 @@ class BaseTilt(Term):
 
 
 @dataclass(frozen=True)
-class TiltFamily(Family):
+class TiltFamily(TermFamily):
     """One place: the whole robot."""
 
     facts: Effect = BASE_TILT_FACTS
+    terms: tuple[type[Term], ...] = (BaseTilt,)
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
         return [[BaseTilt.at(arm, 0)]]
-
-    def from_parameters(
-        self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
-    ) -> tuple[Candidate, Array]:
-        return form_from_parameters((BaseTilt,), arm, joints, parameters, form)
 
 
 BASE_TILT = TiltFamily()
@@ -254,10 +250,11 @@ GEOMETRY_FORMS = (LengthError, HeightError, TwistError, SideError)
 
 
 @dataclass(frozen=True)
-class GeometryFamily(Family):
+class GeometryFamily(TermFamily):
     """Lengths and twists of each joint but the last, whose own belong to its body."""
 
     facts: Effect = GEOMETRY_ERROR_FACTS
+    terms: tuple[type[Term], ...] = GEOMETRY_FORMS
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
         """Those that can change a torque; along y only where the arm has such a length."""
@@ -269,11 +266,6 @@ class GeometryFamily(Family):
             if form is not SideError or _has_side_error(arm, joint)
         ]
         return [[form.at(arm, joint)] for form, joint in places if _changes_torque(form.at(arm, joint), arm)]
-
-    def from_parameters(
-        self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
-    ) -> tuple[Candidate, Array]:
-        return form_from_parameters(GEOMETRY_FORMS, arm, joints, parameters, form)
 
 
 def _has_side_error(arm: Arm, joint: int) -> bool:

@@ -16,7 +16,6 @@ from armlab.effects.contract import (
     TORQUE,
     Candidate,
     Effect,
-    Family,
     Parameter,
     Range,
     Scene,
@@ -34,7 +33,7 @@ from armlab.effects.friction import (
 from armlab.effects.term import (
     EveryJoint,
     Term,
-    form_from_parameters,
+    TermFamily,
     format_less,
     format_number,
     joint_moves,
@@ -380,10 +379,11 @@ DRIFT_FORMS = (ViscousDrift, CoulombDrift, HeatedFriction, ThermometerFriction)
 
 
 @dataclass(frozen=True)
-class DriftFamily(Family):
+class DriftFamily(TermFamily):
     """Drift by time and heat at each joint, runs cold or following one another; by temperature where recorded."""
 
     facts: Effect = FRICTION_DRIFT_FACTS
+    terms: tuple[type[Term], ...] = DRIFT_FORMS
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
         """Several forms a joint."""
@@ -398,12 +398,6 @@ class DriftFamily(Family):
                     found.append([form.at(arm, joint, shape=(x * total,), **details, **more) for x in DRIFT_TIMES])
             found += _thermometer_candidates(arm, joint, scenes)
         return found
-
-    def from_parameters(
-        self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
-    ) -> tuple[Candidate, Array]:
-        """Drift of runs that begin cold."""
-        return form_from_parameters(DRIFT_FORMS, arm, joints, parameters, form)
 
 
 def _run_starts(scenes: Sequence[Scene]) -> tuple[tuple[str, float], ...]:

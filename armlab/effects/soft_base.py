@@ -17,10 +17,10 @@ from typing import Any, Self
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import Candidate, Effect, Family, Parameter, Scene, Value
+from armlab.effects.contract import Candidate, Effect, Parameter, Scene, Value
 from armlab.effects.scene import NO_INERTIA
 from armlab.effects.sensitivity import directional_derivative, horizontal_directions
-from armlab.effects.term import Term, form_from_parameters, format_number
+from armlab.effects.term import Term, TermFamily, format_number
 from armlab.effects.transmission import Twist, felt_inertia, integrate_twist
 from problem.arm import Arm, Joint
 from problem.motion import Motion
@@ -168,19 +168,15 @@ class FlexibleBase(Term):
 
 
 @dataclass(frozen=True)
-class BaseFamily(Family):
+class BaseFamily(TermFamily):
     """One place: below the first joint. An arm with too many joints for one more has none."""
 
     facts: Effect = FLEXIBLE_BASE_FACTS
+    terms: tuple[type[Term], ...] = (FlexibleBase,)
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
         """The base with each shape of a first look."""
         return [] if len(arm) + 1 > MAX_JOINTS else [list(FlexibleBase.initial_shapes(arm, 1, scenes))]
-
-    def from_parameters(
-        self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
-    ) -> tuple[Candidate, Array]:
-        return form_from_parameters((FlexibleBase,), arm, joints, parameters, form)
 
 
 FLEXIBLE_BASE = BaseFamily()

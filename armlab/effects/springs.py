@@ -14,7 +14,6 @@ from armlab.effects.contract import (
     TORQUE,
     Candidate,
     Effect,
-    Family,
     Parameter,
     Scene,
     Value,
@@ -23,7 +22,7 @@ from armlab.effects.term import (
     SIGN_SIGMAS,
     EveryJoint,
     Term,
-    form_from_parameters,
+    TermFamily,
     format_number,
     format_sum,
     joint_moves,
@@ -125,10 +124,11 @@ def sine_and_cosine(amplitude: float, phase: float) -> Array:
 
 
 @dataclass(frozen=True)
-class RippleFamily(Family):
+class RippleFamily(TermFamily):
     """Orders that the motion can separate, up to where it passes them faster than the samples follow."""
 
     facts: Effect = TORQUE_RIPPLE_FACTS
+    terms: tuple[type[Term], ...] = (TorqueRipple,)
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
         """At most ORDERS orders a joint, coarser where there would be more: use `scan` for all of them."""
@@ -158,11 +158,6 @@ class RippleFamily(Family):
                     ]
                 )
         return found
-
-    def from_parameters(
-        self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
-    ) -> tuple[Candidate, Array]:
-        return form_from_parameters((TorqueRipple,), arm, joints, parameters, form)
 
 
 def order_resolution(scenes: Sequence[Scene], joint: int) -> tuple[float, float]:

@@ -92,14 +92,33 @@ class Term(Candidate):
 
 
 @dataclass(frozen=True)
-class EveryJoint(Family):
+class TermFamily(Family):
+    """A family in one form or several, which a model file tells apart by the names of their parameters."""
+
+    facts: Effect
+    terms: tuple[type[Term], ...]
+
+    def from_parameters(
+        self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
+    ) -> tuple[Candidate, Array]:
+        """The form of that name, or the one with the most names among the parameters; ValueError for none."""
+        named = [term for term in self.terms if not form or term.form == form]
+        for term in sorted(named, key=lambda each: -len(each.names)):
+            if set(term.names) <= set(parameters):
+                return term.from_parameters(arm, joints, parameters)
+        if not named:
+            raise ValueError(f"{self.effect} has the forms {', '.join(term.form for term in self.terms)}, not {form}")
+        wanted = " or ".join(", ".join(term.names) for term in named)
+        raise ValueError(f"{self.effect} has parameters {wanted}, not {', '.join(parameters) or 'none'}")
+
+
+@dataclass(frozen=True)
+class EveryJoint(TermFamily):
     """A family whose places are the joints, in one form or several.
 
     resting: whether a joint that never moves can show it, too.
     """
 
-    facts: Effect
-    terms: tuple[type[Term], ...]
     resting: bool = False
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
@@ -107,26 +126,6 @@ class EveryJoint(Family):
         joints = [joint for joint in range(1, len(arm) + 1) if self.resting or joint_moves(scenes, joint)]
         places = [list[Candidate](term.initial_shapes(arm, joint, scenes)) for term in self.terms for joint in joints]
         return [place for place in places if place]
-
-    def from_parameters(
-        self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
-    ) -> tuple[Candidate, Array]:
-        """The form that has these names, with its coefficients; ValueError for other names."""
-        return form_from_parameters(self.terms, arm, joints, parameters, form)
-
-
-def form_from_parameters(
-    terms: Sequence[type[Term]], arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str
-) -> tuple[Candidate, Array]:
-    """The form of that name, or the one with the most names among the parameters; ValueError for none."""
-    named = [term for term in terms if not form or term.form == form]
-    for term in sorted(named, key=lambda each: -len(each.names)):
-        if set(term.names) <= set(parameters):
-            return term.from_parameters(arm, joints, parameters)
-    if not named:
-        raise ValueError(f"{terms[0].facts.id} has the forms {', '.join(term.form for term in terms)}, not {form}")
-    wanted = " or ".join(", ".join(term.names) for term in named)
-    raise ValueError(f"{terms[0].facts.id} has parameters {wanted}, not {', '.join(parameters) or 'none'}")
 
 
 def joint_moves(scenes: Sequence[Scene], joint: int) -> bool:

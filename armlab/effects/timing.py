@@ -10,9 +10,9 @@ from typing import Any, Self
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import Candidate, Effect, Family, Parameter, Range, Scene, Value
+from armlab.effects.contract import Candidate, Effect, Parameter, Range, Scene
 from armlab.effects.sensitivity import delay_signal, directional_derivative
-from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_less
+from armlab.effects.term import EveryJoint, Term, TermFamily, format_less
 from problem.arm import Arm
 from problem.motion import Motion
 
@@ -137,19 +137,15 @@ class PositionSkew(Term):
 
 
 @dataclass(frozen=True)
-class DelayFamily(Family):
+class DelayFamily(TermFamily):
     """One place: the whole robot."""
 
     facts: Effect = TIME_DELAY_FACTS
+    terms: tuple[type[Term], ...] = (TimeDelay,)
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
         """The delay with each shift of a first look."""
         return [list(TimeDelay.initial_shapes(arm, 1, scenes))]
-
-    def from_parameters(
-        self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
-    ) -> tuple[Candidate, Array]:
-        return form_from_parameters((TimeDelay,), arm, joints, parameters, form)
 
 
 TIME_DELAY = DelayFamily()
