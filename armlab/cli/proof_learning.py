@@ -34,7 +34,7 @@ _PATH = click.Path(path_type=Path)
     type=_PATH,
     multiple=True,
     metavar="TABLES",
-    help="Output folder of `armlab proof real-concealed --seed SEED`; may be given more than once.",
+    help="Folder `real/tables` of `armlab proof run --tier real --development SEED`; may be given more than once.",
 )
 @click.option("--out", type=OutputPath(), required=True, help="Folder for calibration.json and calibration.md.")
 @prints_lines

@@ -105,10 +105,9 @@ def real_motion(results: Path, recordings: Path, peer: str | None, peer_windows:
 @click.option("--seed", type=int, help="Draws the cases; 1000-1999 are for development.")
 @click.option("--cases", type=click.IntRange(min=1), default=16, show_default=True, help="Of a recording.")
 @click.option("--out", type=OutputPath(), help="Folder for the tables [default: RESULTS].")
-@click.option("--jobs", type=JobCount(), default=1, show_default=True, help="Processes.")
-@click.option("--make", "made", type=OutputPath(), help="Only write the cases: observations and answers.")
-@click.option("--observation", type=_FILE, help="Only diagnose one of these observations, into --out.")
-@click.option("--judge", "answered", type=_FILE, help="Only judge a folder of cases that were diagnosed.")
+@click.option("--make", "made", type=OutputPath(), help="Write the cases: observations and answers.")
+@click.option("--observation", type=_FILE, help="Diagnose one of these observations, into --out.")
+@click.option("--judge", "answered", type=_FILE, help="Judge a folder of cases that were diagnosed.")
 @prints_lines
 def real_concealed(
     results: Path,
@@ -117,28 +116,26 @@ def real_concealed(
     seed: int | None,
     cases: int,
     out: Path | None,
-    jobs: int,
     made: Path | None,
     observation: Path | None,
     answered: Path | None,
 ) -> Iterator[str]:
-    """Judge diagnoses of effects concealed in real recordings.
+    """Take one step of `armlab proof run --tier real`.
 
-    Conceals effects in public recordings of real arms at random, diagnoses them, and compares. Writes the tables
-    cases.csv, claims.csv and recordings.csv, which `armlab proof run --tier real` scores.
+    Conceals effects in public recordings of real arms at random, diagnoses one of them, or judges what was said: then
+    it writes the tables cases.csv, claims.csv and recordings.csv.
     """
     from armlab.proof.open.real_concealed.at_random import (
         REAL_ARMS,
         RandomCases,
-        conceal_at_random,
         examine_observation,
         judge_cases,
         make_cases,
     )
 
     steps = [name for name, given in (("--make", made), ("--observation", observation), ("--judge", answered)) if given]
-    if len(steps) > 1:
-        raise click.UsageError(f"{' and '.join(steps)} are steps of their own: give one of them")
+    if len(steps) != 1:
+        raise click.UsageError("--make, --observation and --judge are steps of their own: give one of them")
     if observation is not None:
         return examine_observation(observation, out or results, tell_progress)
     if seed is None:
@@ -146,9 +143,8 @@ def real_concealed(
     settings = RandomCases(only or REAL_ARMS, cases, seed)
     if made is not None:
         return make_cases(settings, recordings, results, made, tell_progress)
-    if answered is not None:
-        return judge_cases(settings, answered, out or results)
-    return conceal_at_random(settings, recordings, results, out or results, jobs, tell_progress)
+    assert answered is not None
+    return judge_cases(settings, answered, out or results)
 
 
 @click.command()

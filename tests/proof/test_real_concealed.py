@@ -71,12 +71,12 @@ def test_a_model_without_a_piece_lacks_its_torque_and_nothing_else(reference: Re
     lost = model.torque(motion) - withhold_pieces(model, pieces).torque(motion)
     (sought,) = sought_of_pieces(model, pieces)
     numbers = sought.numbers
-    own = numbers["viscous_friction"]["coefficient"][0] * motion.velocity[:, 1]
-    own += numbers["coulomb_friction"]["level"][0] * np.sign(motion.velocity[:, 1])
+    own = numbers["viscous_friction"]["coefficient"] * motion.velocity[:, 1]
+    own += numbers["coulomb_friction"]["level"] * np.sign(motion.velocity[:, 1])
     np.testing.assert_allclose(lost[:, 1], own, atol=1e-9)
     assert not lost[:, [0, 2]].any()
-    assert numbers["viscous_friction"]["coefficient"][0] == pytest.approx(VISCOUS[1], abs=0.1)
-    assert numbers["coulomb_friction"]["level"][0] == pytest.approx(COULOMB[1], abs=0.1)
+    assert numbers["viscous_friction"]["coefficient"] == pytest.approx(VISCOUS[1], abs=0.1)
+    assert numbers["coulomb_friction"]["level"] == pytest.approx(COULOMB[1], abs=0.1)
 
 
 def test_a_model_without_its_payload_has_the_last_link_of_its_maker(reference: ReferenceModel) -> None:
@@ -91,7 +91,7 @@ def test_a_model_without_its_payload_has_the_last_link_of_its_maker(reference: R
     np.testing.assert_allclose(less.inertial[-10:], ARM.parameters[-10:])
     np.testing.assert_allclose(less.base_values, model.structure.base.values(less.inertial))
     (sought,) = sought_of_pieces(heavy, (Piece("payload", 3),))
-    assert sought.numbers["payload"]["mass"][0] == pytest.approx(1.5)
+    assert sought.numbers["payload"]["mass"] == pytest.approx(1.5)
 
 
 def test_a_piece_that_the_reference_does_not_have_is_refused(reference: ReferenceModel) -> None:

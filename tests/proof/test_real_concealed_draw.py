@@ -132,5 +132,5 @@ def test_a_rotor_is_sought_as_a_link_too_where_no_motion_separates_them() -> Non
 
 def test_a_gain_is_sought_as_the_factor_that_is_read() -> None:
     sought = sought_of_disturbance(Disturbance("torque_gain_error", 2, -0.1, "1"), ARM)
-    assert sought.numbers["torque_gain_error"]["gain"][0] == pytest.approx(0.9)
+    assert sought.numbers["torque_gain_error"]["gain"] == pytest.approx(0.9)
     assert sought.label == "torque of joint 2 times 0.9"

@@ -13,7 +13,7 @@ from small_reference import reference_in
 from armlab.cli.main import main
 from armlab.common.errors import InputError
 from armlab.proof.open.real_concealed import at_random
-from armlab.proof.open.real_concealed.at_random import RandomCases, conceal_at_random, judge_cases
+from armlab.proof.open.real_concealed.at_random import RandomCases, examine_observation, judge_cases, make_cases
 from armlab.proof.open.real_concealed.conceal import ReferenceModel
 from armlab.proof.open.real_concealed.concealed_case import Case, Disturbance, Piece
 from armlab.proof.open.real_concealed.examine import conceal_case
@@ -64,22 +64,18 @@ def test_an_observation_holds_neither_the_public_runs_nor_what_is_concealed(
     assert notes.keys() == {"source", "findings", "runs"}
 
 
-def test_random_cases_are_made_diagnosed_and_judged_and_go_on_after_an_interruption(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    recordings, settings = tmp_path / "recordings", RandomCases(("emps",), 1, 1001)
+def test_random_cases_are_made_diagnosed_and_judged(tmp_path: Path) -> None:
+    recordings, settings, made = tmp_path / "recordings", RandomCases(("emps",), 1, 1001), tmp_path / "made"
     recording_in(recordings / "emps", frame(0, 6), frame(1, 6))
-    list(conceal_at_random(settings, recordings, tmp_path / "results", tmp_path / "out", 1))
-    tables = {path.name: path.read_text() for path in (tmp_path / "out").iterdir()}
-    assert tables.keys() == {*at_random.TABLES, at_random.WEIGHED_FILE}
+    list(make_cases(settings, recordings, tmp_path / "results", made, lambda message: None))
     looks = (tmp_path / "results" / LOOKS_FILE).read_text().splitlines()
     assert len(looks) == 2  # the validation run, with nothing concealed and with something
+    for observation in (made / "observations").iterdir():
+        list(examine_observation(observation, made / "verdicts" / observation.name))
+    list(judge_cases(settings, made, tmp_path / "out"))
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {*at_random.TABLES, at_random.WEIGHED_FILE}
+    assert pd.read_csv(tmp_path / "out" / "cases.csv")["refused"].isna().all()
 
-    monkeypatch.setattr(at_random, "diagnose_concealed", lambda *_: pytest.fail("diagnosed again"))
-    list(conceal_at_random(settings, recordings, tmp_path / "results", tmp_path / "again", 1))
-    assert {path.name: path.read_text() for path in (tmp_path / "again").iterdir()} == tables
-
-    (made,) = (recordings / ".concealed").iterdir()
     (made / "verdicts" / "emps-1" / "outcome.json").unlink()
     list(judge_cases(settings, made, tmp_path / "judged"))
     assert set(pd.read_csv(tmp_path / "judged" / "cases.csv")["refused"]) == {"no verdict"}
@@ -89,7 +85,11 @@ def test_random_cases_are_made_diagnosed_and_judged_and_go_on_after_an_interrupt
 
 @pytest.mark.parametrize(
     ("options", "complaint"),
-    [(["--make", "a", "--judge", "b"], "give one of them"), (["--judge", "b"], "--seed is needed")],
+    [
+        (["--make", "a", "--judge", "b"], "give one of them"),
+        (["--judge", "b"], "--seed is needed"),
+        (["--seed", "1"], "give one of them"),
+    ],
 )
 def test_steps_that_cannot_be_done_are_refused(options: list[str], complaint: str) -> None:
     refused = CliRunner().invoke(main, ["proof", "real-concealed", *options])

@@ -164,4 +164,4 @@ def test_a_command_that_fails_says_why() -> None:
     with pytest.raises(
         InputError, match=r"armlab proof real-concealed: .*unknown recording 'epms': did you mean 'emps'"
     ):
-        list(proving._run_command(["proof", "real-concealed", "--only", "epms", "--seed", "1001"]))
+        list(proving._run_command(["proof", "real-concealed", "--only", "epms", "--seed", "1001", "--make", "made"]))

@@ -30,5 +30,5 @@ def test_nothing_is_learnt_from_a_set_that_judges(tmp_path: Path) -> None:
 
 
 def test_a_folder_without_the_file_is_told_what_writes_it(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"weighed\.json: `armlab proof real-concealed --seed SEED` writes it"):
+    with pytest.raises(InputError, match=r"weighed\.json: `armlab proof run --tier real` writes it"):
         read_weighed_real(tmp_path)

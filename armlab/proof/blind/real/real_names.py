@@ -13,15 +13,13 @@ WEIGHED_FILE = "weighed.json"
 def read_weighed_real(folder: Path) -> tuple[str, list[tuple[str, WeighedFinding]]]:
     """What a development set is, and its weighed findings, each with the name of its recording.
 
-    folder: of the tables of `armlab proof real-concealed --seed SEED --out FOLDER`. Raises InputError for one without
+    folder: of the tables of `armlab proof run --tier real`. Raises InputError for one without
     them, or of a set that judges.
     """
     try:
         content = json.loads((folder / WEIGHED_FILE).read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise InputError(
-            f"{folder} has no {WEIGHED_FILE}: `armlab proof real-concealed --seed SEED` writes it"
-        ) from None
+        raise InputError(f"{folder} has no {WEIGHED_FILE}: `armlab proof run --tier real` writes it") from None
     seed = int(content["seed"])
     check_development(seed, folder)
     found = [

@@ -1,4 +1,4 @@
-"""Measures of random cases of real recordings, from the tables that `armlab proof real-concealed` writes.
+"""Measures of random cases of real recordings, from the tables that `armlab proof real-concealed --judge` writes.
 
 The reliability of probabilities and the shares are counted by the functions that score the simulated tiers.
 """
@@ -52,7 +52,7 @@ TITLES = {  # of measures that mean something else here than in a simulated tier
 
 @dataclass(frozen=True, eq=False)
 class RealTables:
-    """A row for each thing sought, each new claim, and each recording; see `armlab proof real-concealed`."""
+    """A row for each thing sought, each new claim, and each recording; see `armlab proof real-concealed --judge`."""
 
     cases: pd.DataFrame
     claims: pd.DataFrame
@@ -97,7 +97,7 @@ def read_tables(folder: Path) -> RealTables:
     try:
         return RealTables(*(pd.read_csv(folder / name) for name in (CASES_TABLE, CLAIMS_TABLE, RECORDINGS_TABLE)))
     except OSError as error:
-        raise InputError(f"cannot read {error.filename}: `armlab proof real-concealed --seed SEED` writes it") from None
+        raise InputError(f"cannot read {error.filename}: `armlab proof run --tier real` writes it") from None
 
 
 @dataclass(frozen=True)

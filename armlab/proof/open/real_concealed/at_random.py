@@ -1,17 +1,16 @@
-"""Random cases of public recordings: identify, draw, conceal, diagnose and judge; the tables of what came out.
+"""Random cases of public recordings in steps: identify, draw and conceal; diagnose; judge; and the tables of that.
 
-`armlab proof run --tier real` scores the tables, and `armlab proof calibrate-names --real` learns from the names that
-were weighed. All outcomes are stored, so that an interrupted command continues.
+`armlab proof run --tier real` takes the steps, with the seal between them, and scores the tables; `armlab proof
+calibrate-names --real` learns from the names that were weighed.
 """
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from joblib import Parallel, delayed
 from pydantic import TypeAdapter
 
 from armlab.common.errors import InputError
@@ -32,13 +31,11 @@ from armlab.proof.open.real_concealed.examine import (
 from armlab.proof.open.real_concealed.observation import read_observation, write_observation
 from armlab.proof.open.real_identification.identify_recording import recipe_named
 from armlab.proof.open.real_identification.looks import LOOKS_FILE, Looks
-from armlab.proof.open.stored import code_digest
 from armlab.recordings.public import open_public_recording
 from armlab.recordings.reading.words import NAMES as MISTAKE_NAMES
 from armlab.report.words import effect_in_words
 
 REAL_ARMS = ("emps", "staubli-tx40", "unisa-ur10", "unisa-panda", "kuka-kr300")
-OUTCOMES_FOLDER = ".concealed"  # below that of the recordings
 TABLES = ("cases.csv", "claims.csv", "recordings.csv")
 WEIGHED_FILE, WEIGHED_SCHEMA = "weighed.json", "weighed/1"
 CASE_COLUMNS = (
@@ -105,32 +102,6 @@ class RandomTruth:
 OBSERVATIONS, TRUTH, VERDICTS, OUTCOME_FILE = "observations", "truth", "verdicts", "outcome.json"
 
 
-def conceal_at_random(
-    settings: RandomCases,
-    recordings: Path,
-    results: Path,
-    out: Path,
-    jobs: int,
-    progress: Callable[[str], None] = lambda message: None,
-) -> Iterator[str]:
-    """Makes, diagnoses and judges random cases; lines that tell what is done and written.
-
-    recordings: folder of the recordings, which are fetched into it. results: folder of the log of looks. out: folder of
-    the tables. What was diagnosed before an interruption is not diagnosed again.
-    """
-    code = code_digest(*Path(__file__).parent.glob("*.py"))
-    folder = recordings / OUTCOMES_FOLDER / f"random-{settings.seed}-{settings.cases}-{code[:20]}"
-    wanted = {name: [f"{name}-{number}" for number in range(settings.cases + 1)] for name in settings.recordings}
-    new = [name for name, keys in wanted.items() if not all(_truth_file(folder, key).is_file() for key in keys)]
-    yield from make_cases(replace(settings, recordings=tuple(new)), recordings, results, folder, progress)
-    keys = [key for each in wanted.values() for key in each]
-    waiting = [key for key in keys if not (folder / VERDICTS / key / OUTCOME_FILE).is_file()]
-    tasks = (delayed(_examine)(folder / OBSERVATIONS / key, folder / VERDICTS / key) for key in waiting)
-    for number, key in enumerate(Parallel(n_jobs=jobs, return_as="generator_unordered")(tasks), 1):
-        yield f"  diagnosed {number} of {len(waiting)}: {key}"
-    yield from judge_cases(settings, folder, out)
-
-
 def make_cases(
     settings: RandomCases, recordings: Path, results: Path, folder: Path, progress: Callable[[str], None]
 ) -> Iterator[str]:
@@ -173,12 +144,6 @@ def examine_observation(
     outcome = diagnose_concealed(*read_observation(observation), progress)
     text = OUTCOME_ADAPTER.dump_json(outcome, indent=1).decode() + "\n"
     yield from (f"wrote {path}" for path in write_texts({OUTCOME_FILE: text}, out))
-
-
-def _examine(observation: Path, out: Path) -> str:
-    for _ in examine_observation(observation, out):
-        pass
-    return observation.name
 
 
 def judge_cases(settings: RandomCases, folder: Path, out: Path) -> Iterator[str]:

@@ -52,7 +52,7 @@ class BesideControl:
         for each in (each for each in self.control.findings if self.answers(each, sought)):
             for size in each.sizes:
                 truth = sought.numbers.get(each.effect, {}).get(size.name)
-                if truth is not None and abs(size.value + truth[0]) < abs(size.value):
+                if truth is not None and abs(size.value + truth) < abs(size.value):
                     return True
         return False
 

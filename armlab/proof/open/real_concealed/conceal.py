@@ -10,7 +10,6 @@ from scipy.interpolate import make_interp_spline
 from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate
 from armlab.effects.library import library
-from armlab.effects.parameters import ParameterValue
 from armlab.identification.identifier import Identifier
 from armlab.identification.selection import Groups, components_of, describe_choice, select_structure
 from armlab.identification.torque_model import TorqueModel
@@ -61,7 +60,6 @@ EQUIVALENT_NAMES = {"inertial_parameter_error": "payload", "gravity_compensator"
 """What no motion separates, or what goes by either name; both count as the second one."""
 EQUIVALENT_AT_ONLY_JOINT = {"channel_skew": "time_delay", "rotor_inertia": "payload"}
 """The same at the only joint of an arm."""
-KnownNumber = tuple[float, tuple[float, float] | None]
 
 
 @dataclass(frozen=True)
@@ -69,14 +67,14 @@ class SoughtEffect:
     """What should be named.
 
     effects: ids, any of which answers. joints: (joint,), (link,), (joint, driving joint), or () for the whole arm.
-    numbers: by effect and parameter the value that is true or of the reference, and the 95 % interval of the reference.
+    numbers: by effect and parameter the value that is true or of the reference.
     identical: other effects that no motion separates from it. laws: other effects of the same kind.
     """
 
     label: str
     effects: tuple[str, ...]
     joints: tuple[int, ...]
-    numbers: dict[str, dict[str, KnownNumber]]
+    numbers: dict[str, dict[str, float]]
     identical: tuple[str, ...] = ()
     laws: tuple[str, ...] = ()
 
@@ -130,23 +128,16 @@ def sought_of_pieces(model: TorqueModel, pieces: tuple[Piece, ...]) -> tuple[Sou
 
 def _sought_laws(model: TorqueModel, piece: Piece) -> tuple[SoughtEffect, ...]:
     parts = model.structure.components
-    numbers_by_place: dict[tuple[int, ...], dict[str, dict[str, KnownNumber]]] = {}
+    numbers_by_place: dict[tuple[int, ...], dict[str, dict[str, float]]] = {}
     for index in _part_indices(model, piece):
-        numbers = dict(_known_number(each) for each in model.component_parameters(index))
+        numbers = {each.name: float(np.sum(each.value)) for each in model.component_parameters(index)}
         numbers_by_place.setdefault(parts[index].joints, {})[parts[index].effect] = numbers
     return tuple(
         _build_sought(_piece_label(piece, joints), joints, numbers) for joints, numbers in numbers_by_place.items()
     )
 
 
-def _known_number(parameter: ParameterValue) -> tuple[str, KnownNumber]:
-    """Name, value and interval of a parameter that is one number, as those of all components here are."""
-    interval = parameter.interval
-    pair = None if interval is None else (float(np.sum(interval[0])), float(np.sum(interval[1])))
-    return parameter.name, (float(np.sum(parameter.value)), pair)
-
-
-def _build_sought(label: str, joints: tuple[int, ...], known: dict[str, dict[str, KnownNumber]]) -> SoughtEffect:
+def _build_sought(label: str, joints: tuple[int, ...], known: dict[str, dict[str, float]]) -> SoughtEffect:
     """A spring or a body keeps its numbers under each of its equivalent names. known: by effect and parameter."""
     same = tuple(other for effect in known for other in equivalent_effects(effect))
     numbers = known | {other: known[effect] for effect in known for other in equivalent_effects(effect)}
@@ -160,17 +151,10 @@ def _piece_label(piece: Piece, joints: tuple[int, ...]) -> str:
 
 
 def _sought_load(model: TorqueModel) -> tuple[SoughtEffect, ...]:
-    """The load: the last link as identified, less the link of its maker.
-
-    The interval of its mass is that of the base parameter which contains this mass.
-    """
+    """The load: the last link as identified, less the link of its maker."""
     more = _model_links(model)[-10:] - model.arm.parameters[-10:]
-    link, base = len(model.arm), model.structure.base
-    place = int(np.flatnonzero(base.grouping[:, -10])[0])
-    half = np.nan if model.covariance is None else model.factor * float(np.sqrt(model.covariance[place, place]))
-    mass = float(more[0])
-    numbers: dict[str, dict[str, KnownNumber]] = {"payload": {"mass": (mass, (mass - half, mass + half))}}
-    return (_build_sought(f"payload, link {link}", (link,), numbers),)
+    link = len(model.arm)
+    return (_build_sought(f"payload, link {link}", (link,), {"payload": {"mass": float(more[0])}}),)
 
 
 def _model_links(model: TorqueModel) -> Array:
@@ -227,17 +211,17 @@ def sought_of_disturbance(what: Disturbance, arm: Arm) -> SoughtEffect:
     rotor from a link that may have any inertia about its axis.
     """
     value = 1 + what.size if what.effect == "torque_gain_error" else what.size
-    size: dict[str, KnownNumber] = {MAIN_PARAMETER[what.effect]: (value, None)}
+    size: dict[str, float] = {MAIN_PARAMETER[what.effect]: value}
     if what.effect == "torque_ripple":
-        size["order"] = (float(what.order), None)
-    numbers: dict[str, dict[str, KnownNumber]] = {what.effect: size}
+        size["order"] = float(what.order)
+    numbers: dict[str, dict[str, float]] = {what.effect: size}
     place = () if what.joint is None else (what.joint,)
     same = equivalent_effects(what.effect)
     numbers |= dict.fromkeys(same, size)
     if len(arm) == 1:
         alike = tuple(name for name, other in EQUIVALENT_AT_ONLY_JOINT.items() if other == what.effect)
         same += alike
-        numbers |= {name: {MAIN_PARAMETER[name]: (what.size, None)} for name in alike}
+        numbers |= {name: {MAIN_PARAMETER[name]: what.size} for name in alike}
     if what.effect == "rotor_inertia" and what.joint is not None and links_hold_rotor(arm, what.joint):
         same += ("payload", *equivalent_effects("payload"))
     return SoughtEffect(str(what), (what.effect,), place, numbers, same)
