@@ -10,8 +10,8 @@
 #include <string.h>
 
 #define LANES 4
-#define MAX_SIZE 208        /* 16 joints with ten columns and three of their own each */
-#define MAX_STEPS 400       /* of the iteration: a handful, but hundreds where half of all eigenvalues meet */
+#define MAX_SIZE 208       /* 16 joints with ten columns and three of their own each */
+#define MAX_STEPS 400      /* of the iteration: a handful, but hundreds where half of all eigenvalues meet */
 #define SMALL_STEP 0x1p-50 /* of the eigenvalue: four units in its last place */
 typedef double V __attribute__((vector_size(8 * LANES)));
 typedef int64_t I __attribute__((vector_size(8 * LANES)));
@@ -111,14 +111,15 @@ INLINE void sum_over_spectra(int n, V (*minus_diagonals)[MAX_SIZE], const V *bes
 /* last: (ENDS,), bounds from above of the last eigenvalues of a tridiagonal matrix and of its negative, to these
  * eigenvalues; returns where both are found. Each step ends above the eigenvalue but for rounding. */
 INLINE I find_last_eigenvalues(int n, V (*minus_diagonals)[MAX_SIZE], const V *beside, V *last) {
+    double count = n;
     V zero = {0};
     I moving[ENDS] = {~(I){0}, ~(I){0}};
     for (int step = 0; step < MAX_STEPS && any(moving[0] | moving[1]); step++) {
         Sums sums[ENDS];
         sum_over_spectra(n, minus_diagonals, beside, last, sums);
         for (int e = 0; e < ENDS; e++) {
-            V first = sums[e].first, spread = (n - 1.0) * (n * sums[e].second - first * first);
-            V way = n / (first + root(choose(spread > 0, spread, zero)));
+            V first = sums[e].first, spread = (count - 1) * (count * sums[e].second - first * first);
+            V way = count / (first + root(choose(spread > 0, spread, zero)));
             moving[e] &= sums[e].positive;
             last[e] = choose(moving[e], last[e] - way, last[e]);
             moving[e] &= way > SMALL_STEP * size(last[e]);
