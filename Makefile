@@ -32,7 +32,7 @@ install-dev: .venv/dev ## what the tests need too
 lock: .venv/dev ## choose the versions of all dependencies anew
 	$(BIN)/uv pip compile --quiet --upgrade --python-version 3.11 --generate-hashes --no-emit-index-url --extra dev \
 		--custom-compile-command "make lock" pyproject.toml -o requirements/dev.lock
-	$(BIN)/uv pip compile --quiet --python-version 3.11 --generate-hashes --no-emit-index-url --extra build \
+	$(BIN)/uv pip compile --quiet --python-version 3.11 --generate-hashes --no-emit-index-url --extra build --extra diagnose --extra harness \
 		--custom-compile-command "make lock" --constraint requirements/dev.lock pyproject.toml -o requirements/run.lock
 
 # --- results

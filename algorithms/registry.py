@@ -10,6 +10,7 @@ from difflib import get_close_matches
 from importlib.metadata import EntryPoint, entry_points
 
 from algorithms.contract import AnyAlgorithm
+from armlab.common.packages import missing_package
 from armlab.common.plug_ins import BrokenPlugInError, load_plug_in
 
 ENTRY_POINT_GROUP = "armlab.algorithms"
@@ -50,7 +51,7 @@ _WITH_DERIVATIVES = {
     "ipopt": "algorithms.peers.ipopt_adapter:Ipopt",
 }
 
-_EXTRAS = dict.fromkeys(_PEERS, "peers") | {"ipopt": "derivatives"}
+_RUN_BY_OTHERS = {*_PEERS, "ipopt"}
 
 
 class UnknownAlgorithmError(ValueError):
@@ -73,13 +74,13 @@ def peer_names() -> list[str]:
 
 
 def names_with_derivatives() -> list[str]:
-    """Names of algorithms that ask for derivatives; `ipopt` needs the extra `derivatives`."""
+    """Names of algorithms that ask for derivatives; `ipopt` needs the extra `peers`."""
     return list(_WITH_DERIVATIVES)
 
 
 def is_our_code(name: str) -> bool:
     """Whether an algorithm's loop stands in this package: neither a plug-in nor one that runs another package's."""
-    return name in (_BUILT_IN | _WITH_DERIVATIVES).keys() - _EXTRAS.keys()
+    return name in (_BUILT_IN | _WITH_DERIVATIVES).keys() - _RUN_BY_OTHERS
 
 
 def load(name: str) -> AnyAlgorithm:
@@ -113,9 +114,9 @@ def _load_entry(entry: EntryPoint) -> AnyAlgorithm:
     try:
         algorithm: AnyAlgorithm = load_plug_in(entry)
     except BrokenPlugInError as error:
-        if isinstance(error.__cause__, ModuleNotFoundError) and entry.name in _EXTRAS:
-            missing = f"algorithm {entry.name!r} needs the package {error.__cause__.name!r}"
-            raise BrokenAlgorithmError(f"{missing}: pip install 'armlab[{_EXTRAS[entry.name]}]'") from error
+        missing = missing_package(error.__cause__, f"algorithm {entry.name!r}")
+        if missing is not None:
+            raise BrokenAlgorithmError(missing) from error
         place = f"algorithm {entry.name!r} ({entry.value})"
         raise BrokenAlgorithmError(f"{place} cannot be imported: {error}") from error
     return algorithm

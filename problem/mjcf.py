@@ -9,6 +9,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError, in_one_line
+from armlab.common.packages import import_package
 from problem.arm import Arm, Joint, JointLaw, Limits, Link
 from problem.coupled_joints import couple_joints
 from problem.mjcf_document import UneditableError
@@ -22,13 +23,7 @@ from problem.transforms import inverse, translation, turn_z_to
 
 def import_mujoco() -> Any:
     """The package mujoco; InputError, with the command that installs it, where it is missing."""
-    try:
-        import mujoco
-    except ImportError:
-        raise InputError(
-            "MuJoCo is missing, which MJCF files, replay and distances need: pip install 'armlab[motion]'"
-        ) from None
-    return mujoco
+    return import_package("mujoco", "what reads MJCF, replays a motion or measures distances")
 
 
 def compile_mjcf(path: Path) -> Any:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.packages import install_line
 from problem.collision import ArmShape
 from problem.motion import Motion
 from problem.safe_motion import SafetyRules, describe_distance, describe_pose
@@ -203,7 +204,7 @@ def _not_checked(rules: SafetyRules) -> Iterator[str]:
     if not settings.keep_out:
         yield "things around the arm: no box is given (--keep-out)"
     if rules.shape is None:
-        yield "the arm itself: MuJoCo is missing (pip install 'armlab[motion]')"
+        yield f"the arm itself: MuJoCo is missing ({install_line('motion')})"
     elif len(rules.arm) > 1:
         yield "neighbouring links against each other: their joint range keeps them apart"
     yield from rules.left_out

@@ -188,7 +188,7 @@ def tune(
     """Tune ALGORITHMS, the same budget for each [default: all].
 
     Tries hyper-parameters on training problems and judges the best ones on problems that took no part, beside the
-    published ones. You can stop it at any time; the next call continues from there. Needs the extra `tune`.
+    published ones. You can stop it at any time; the next call continues from there. Needs the extra `peers`.
     """
     from joblib import cpu_count
 

@@ -34,7 +34,7 @@ def conceal(
 ) -> ResultLines:
     """Make recordings with hidden effects and sealed answers.
 
-    Needs the extra `engines`.
+    Needs the extra `proof`.
     """
     from tqdm import tqdm
 
@@ -100,7 +100,7 @@ def oracle(
     """Ask what anyone could name of a concealed set.
 
     Simulates the set again and compares every hidden effect with all laws, of the library and outside it (extra
-    `engines`). In the folder of a score, the distance to the oracle is added to its page.
+    `proof`). In the folder of a score, the distance to the oracle is added to its page.
     """
     from tqdm import tqdm
 

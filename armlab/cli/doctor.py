@@ -18,6 +18,7 @@ from typing import Literal
 
 from armlab.common.documents import FailedResultError, ResultLines
 from armlab.common.errors import InputError, in_one_line
+from armlab.common.packages import install_line
 
 State = Literal["ok", "missing", "broken"]
 KERNELS = {
@@ -111,7 +112,7 @@ def _examine_extra(extra: str, packages: dict[str, str]) -> Examined:
         return Examined(f"extra {extra}", "ok", ", ".join(f"{each.name} {each.text}" for each in found))
     state: State = "broken" if any(each.state == "broken" for each in wrong) else "missing"
     told = "; ".join(f"{each.name} {each.text}" for each in wrong)
-    return Examined(f"extra {extra}", state, f"{told}: pip install 'armlab[{extra}]'")
+    return Examined(f"extra {extra}", state, f"{told}: {install_line(extra)}")
 
 
 def _examine_kernel(module: str, purpose: str) -> Examined:
@@ -134,7 +135,7 @@ def _examine_folders() -> Iterator[Examined]:
         text = str(copies) if there else f"{copies} is no folder, and public recordings are looked for there alone"
         yield Examined(LOCAL_COPIES_VARIABLE, "ok" if there else "missing", text)
     if cache is None:
-        yield Examined("download cache", "missing", "no downloads without pooch: pip install 'armlab[recordings]'")
+        yield Examined("download cache", "missing", f"no downloads without pooch: {install_line('recordings')}")
     else:
         count = sum(path.is_file() for path in cache.rglob("*")) if cache.is_dir() else 0
         yield Examined("download cache", "ok", f"{cache}, {count} files")

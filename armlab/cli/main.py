@@ -75,8 +75,13 @@ class _FirstScreen(CommandTable):
             click.echo(f"armlab: {str(error.filename)[:_SHOWN_CHARACTERS]}...: {error.strerror}", err=True)
             ctx.exit(2)
         except (Exception, SystemExit) as error:
+            from armlab.common.packages import missing_package
             from armlab.common.plug_ins import plug_in_at_fault
 
+            missing = missing_package(error, "this command")
+            if missing is not None:
+                click.echo(f"armlab: {missing}", err=True)
+                ctx.exit(2)
             line = plug_in_at_fault(error)
             if line is None:
                 raise

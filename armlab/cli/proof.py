@@ -59,7 +59,7 @@ def prove(
 
     Tier by tier: torque, how recordings are read (setup), motion only, real recordings with something concealed; where
     asked for, what changed between recordings, and recordings that resemble real ones (field). Logs the scores. After
-    an interruption the same command continues (extra `engines`).
+    an interruption the same command continues (extra `proof`).
     """
     from armlab.proof.tiers.tiers import USUAL_TIERS, choose_proof, prove_tiers
 

@@ -44,7 +44,7 @@ def calibrate_names(
     """Learn the probabilities of names from concealed sets.
 
     Uses development sets alone, and checks the probabilities on cases that are left out in turn, of real recordings all
-    of one together (extra `calibrate`).
+    of one together (extra `proof`).
     """
     from armlab.diagnosis.choice import Example
     from armlab.proof.blind.real.real_names import read_weighed_real
@@ -153,7 +153,7 @@ def ablate(
     """Measure what each guard of the diagnosis is worth.
 
     Diagnoses concealed cases with one guard off at a time, and with one tuning number changed at a time (extra
-    `engines`).
+    `proof`).
     """
     from functools import partial
 
@@ -186,7 +186,7 @@ def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int)
     """Measure how well a second motion decides between rivals.
 
     Makes ambiguous recordings, diagnoses them, adds a second motion, diagnoses both, and counts how often the right
-    name is left (extra `engines`).
+    name is left (extra `proof`).
     """
     from tqdm import tqdm
 
@@ -223,7 +223,7 @@ def likeness(
 
     Makes nulls of the realistic and of the field tier, trains a classifier on features of them and of the real
     recordings below ARMLAB_RECORDINGS, one real arm left out at a time, and writes the area under its curve with both
-    distributions. Each look is logged (extra `calibrate`).
+    distributions. Each look is logged (extra `proof`).
     """
     from armlab.common.errors import InputError
     from armlab.common.files import write_texts

@@ -78,8 +78,8 @@ def regression(context: click.Context, task: str | None, workers: int | None, co
 def speed(results: Path) -> ResultLines:
     """Measure speed beside that of other packages.
 
-    The others are Pinocchio, CasADi, mealpy, pygmo and scipy (extras `engines`, `derivatives`, `peers`). Writes
-    speed.json and speed.md. Needs a C compiler, and a C++ compiler for the code built by hand.
+    The others are Pinocchio, CasADi, mealpy, pygmo and scipy (extra `peers`). Writes speed.json and speed.md. Needs a C
+    compiler, and a C++ compiler for the code built by hand.
     """
     from bench.studies.speed.report import write_speed_report
 

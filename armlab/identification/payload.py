@@ -20,8 +20,9 @@ from armlab.common.errors import DataError, InputError
 from armlab.effects.drive import TorqueOffset
 from armlab.identification.components import usual_components
 from armlab.identification.covariance import uncertainty
+from armlab.identification.estimators.conic import ConicProgram
 from armlab.identification.estimators.least_squares import WeightedLeastSquares, joint_weights
-from armlab.identification.estimators.physical import TYPICAL_BODY, load_cvxpy, minimise
+from armlab.identification.estimators.physical import TYPICAL_BODY
 from armlab.identification.priors import point_mass
 from armlab.identification.regression import Regression, regression, require_rows, signals_of, suggested_cutoff
 from armlab.identification.selection import counterbalance_groups
@@ -40,24 +41,24 @@ def nearest_physical_load(data: Regression, free: Array, basis: Array) -> Array:
     """The load's numbers (sought,), which are the last columns of weighted data; the others stay free.
 
     free: the numbers without the condition, returned where they are physical. basis: (10, sought), parameters of
-    each number. Raises InputError without CVXPY, RuntimeError where the solver finds no solution.
+    each number. Raises InputError without Clarabel, RuntimeError where the solver finds no solution.
     """
     units = pseudo_inertias(basis.T.ravel())
     shapes = units / np.outer(TYPICAL_BODY, TYPICAL_BODY)  # near the unit matrix for a load of a usual size
     eigenvalues = np.linalg.eigvalsh(np.tensordot(free, shapes, 1))
     if eigenvalues[0] >= -EIGENVALUE_TOLERANCE * np.abs(eigenvalues).max():
         return free
-    cp = load_cvxpy()
     triangle = np.linalg.qr(np.column_stack([data.matrix, data.torque]))[1]
     own = slice(data.matrix.shape[1] - len(free), data.matrix.shape[1])
     block, target = triangle[own, own], triangle[own, -1]
     lengths = np.linalg.norm(block, axis=0)
-    scaled = cp.Variable(len(free))
-    body = sum(scaled[index] * shapes[index] / lengths[index] for index in range(len(free)))
     size = max(float(np.linalg.norm(target)), 1e-300)
-    error = cp.sum_squares((block / lengths) @ scaled - target / size)
-    minimise(cp, error, [body >> 0], "load that can exist")
-    return np.asarray(size * scaled.value / lengths)
+    program = ConicProgram(len(free))
+    program.require_semidefinite(shapes / lengths[:, None, None], np.zeros((4, 4)))
+    found = program.solve(block / lengths, target / size)
+    if isinstance(found, str):
+        raise RuntimeError(f"no load that can exist was found: the solver says '{found}'")
+    return np.asarray(size * found / lengths)
 
 
 MIN_SINGULAR_VALUE_SHARE = 1e-8  # of the largest singular value of the load's columns at unit length

@@ -13,6 +13,7 @@ from scipy.io import loadmat
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError, in_one_line
+from armlab.common.packages import MissingPackageError
 from armlab.common.settings import suggest_name
 from armlab.recordings.imports.ros import read_bag
 from armlab.recordings.load import load_recording
@@ -387,7 +388,7 @@ def cache_folder() -> Path | None:
 def _download(recording: PublicRecording, address: str, file: RemoteFile) -> Path:
     cache = cache_folder()
     if cache is None:
-        raise InputError("to download recordings install pooch: pip install 'armlab[recordings]'")
+        raise MissingPackageError("pooch", "a download of recordings")
     import pooch
 
     try:

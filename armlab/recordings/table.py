@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError, in_one_line
+from armlab.common.packages import MissingPackageError
 from armlab.common.settings import suggest_name
 from armlab.recordings.recording import Finding
 from armlab.recordings.text_rows import RowLayout, open_lines, read_rows, split_line
@@ -106,7 +107,7 @@ def _read_parquet(path: Path) -> Table:
         import pyarrow as arrow
         from pyarrow import parquet
     except ImportError:
-        raise InputError(f"{path}: to read Parquet install pyarrow: pip install 'armlab[recordings]'") from None
+        raise MissingPackageError("pyarrow", f"{path}: Parquet") from None
     try:
         with parquet.ParquetFile(path, pre_buffer=False) as file:
             names = tuple(file.schema_arrow.names)

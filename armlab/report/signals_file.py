@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.packages import import_package
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.torque.rows.data import rows_in
 from armlab.recordings.recording import MotionRun, Role
@@ -41,10 +41,7 @@ class Track:
 
 def check_signals_writer() -> None:
     """InputError where the package that writes the file is not installed."""
-    try:
-        import rosbags  # noqa: F401
-    except ImportError:
-        raise InputError("--mcap needs rosbags: pip install 'armlab[recordings]'") from None
+    import_package("rosbags", "--mcap")
 
 
 def diagnosis_tracks(diagnosis: Diagnosis) -> list[Track]:

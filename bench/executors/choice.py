@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from importlib import import_module
 
 from armlab.common.errors import InputError
+from armlab.common.packages import missing_package
 from bench.executors.contract import BatchExecutor, ExecutorSettings
 from bench.executors.local import local_executor
 
@@ -32,8 +33,6 @@ def open_executor(
     try:
         make = getattr(import_module(module), name)
     except ModuleNotFoundError as error:
-        raise InputError(
-            f"executor '{settings.backend}' needs the package '{error.name}': pip install 'armlab[cluster]'"
-        ) from None
+        raise InputError(missing_package(error, f"executor '{settings.backend}'") or str(error)) from None
     with make(settings.address, workers, timeout_s) as executor:
         yield executor

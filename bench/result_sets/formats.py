@@ -22,6 +22,7 @@ import yaml
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.files import all_or_none, write_whole
+from armlab.common.packages import MissingPackageError
 from armlab.common.report.printed_table import TABLE_FORMS
 from bench.config import NAME_PATTERN
 from bench.files import file_name
@@ -201,7 +202,7 @@ def _to_parquet(pieces: Iterator[pd.DataFrame]) -> bytes:
         from pyarrow import Table
         from pyarrow.parquet import ParquetWriter
     except ImportError:
-        raise InputError("Parquet needs the package `pyarrow`: install it, or write CSV") from None
+        raise MissingPackageError("pyarrow", "Parquet") from None
     first = Table.from_pandas(next(pieces), preserve_index=False)
     buffer = BytesIO()
     with ParquetWriter(buffer, first.schema) as writer:
@@ -222,7 +223,7 @@ def _from_parquet(path: Path) -> pd.DataFrame:
     try:
         return pd.read_parquet(path)
     except ImportError:
-        raise InputError(f"{path}: to read Parquet install the package `pyarrow`") from None
+        raise MissingPackageError("pyarrow", f"{path}: Parquet") from None
 
 
 _READERS: dict[str, Callable[[Path], pd.DataFrame]] = {"csv": _from_csv, "parquet": _from_parquet}

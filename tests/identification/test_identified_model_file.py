@@ -39,7 +39,7 @@ def model(method: str = "weighted") -> Model:
 @pytest.mark.parametrize("method", ["weighted", "physical"])
 def test_a_model_predicts_the_same_after_a_round_trip(tmp_path: Path, method: str) -> None:
     if method == "physical":
-        pytest.importorskip("cvxpy")
+        pytest.importorskip("clarabel")
     saved = model(method)
     loaded = Model.load(saved.save(tmp_path / "model.yaml"))
     moved = motion(9)[1]

@@ -93,7 +93,7 @@ def six_joint_run(load: Array, seed: int, noise: float) -> Run:
 
 
 def test_a_load_is_a_body_that_can_exist_even_where_noise_says_otherwise() -> None:
-    pytest.importorskip("cvxpy")
+    pytest.importorskip("clarabel")
     structure = Structure(load_arm("irb120"), ())
     without = [signals_of(six_joint_run(np.zeros(10), 1, 1.0), 10.0)]
     loaded = [signals_of(six_joint_run(0.5 * point_mass(1, (0.0, 0.0, 0.05)), 2, 1.0), 10.0)]
@@ -105,7 +105,7 @@ def test_a_load_is_a_body_that_can_exist_even_where_noise_says_otherwise() -> No
 
 
 def test_a_load_that_is_not_there_has_no_centre(tmp_path: Path) -> None:
-    pytest.importorskip("cvxpy")
+    pytest.importorskip("clarabel")
     folders = [six_joint_recording(tmp_path / str(seed), six_joint_run(np.zeros(10), seed, 1.0)) for seed in (1, 2)]
     text = invoke(payload, folders[0], "--without", folders[1])
     assert "its centre is not determined: the interval of its mass reaches zero" in text

@@ -83,7 +83,7 @@ def test_predict_meets_the_recorded_torque_and_writes_what_it_predicts(recording
 
 
 def test_physical_links_go_all_the_way_to_a_simulator_file(recording: Path, tmp_path: Path) -> None:
-    pytest.importorskip("cvxpy")
+    pytest.importorskip("clarabel")
     invoke(identify, recording, "--out", tmp_path / "out", "--method", "physical", "--tolerance", "0.5")
     text = invoke(export_model, tmp_path / "out" / "model.yaml", tmp_path / "arm.xml")
     assert "torque offset at joint 1 (0.4 N m); " in text

@@ -1,21 +1,20 @@
 """Full physical consistency: pseudo-inertias positive semidefinite, friction dissipative; a convex problem.
 
 Sousa and Cortesao 2014; Wensing, Kim and Slotine 2018; the pull to the nominal model is the entropic
-(Bregman log-det) divergence of Lee, Wensing and Park 2020. Solved by Clarabel through CVXPY (extra
-`identify`).
+(Bregman log-det) divergence of Lee, Wensing and Park 2020.
 
 Friction takes energy away: linear conditions on its coefficients.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
 from armlab.effects.drive import RotorInertia
 from armlab.effects.scene import instants
+from armlab.identification.estimators.conic import ConicProgram
 from armlab.identification.estimators.least_squares import (
     Estimate,
     WeightedLeastSquares,
@@ -79,7 +78,7 @@ class PhysicalLeastSquares:
     by_joint: bool = True
 
     def __call__(self, data: Regression) -> PhysicalEstimate:
-        """The estimate; raises InputError without CVXPY, RuntimeError where the solver finds no solution."""
+        """The estimate; raises InputError without Clarabel, RuntimeError where the solver finds no solution."""
         weights = self._weights(data)
         weighted = data.weighted(weights)
         inertial, values = self._solve(weighted)
@@ -98,31 +97,41 @@ class PhysicalLeastSquares:
         return np.full(data.joints, 1 / np.sqrt(np.mean(data.residuals(free) ** 2)))
 
     def _solve(self, data: Regression) -> tuple[Array, Array]:
-        cp = load_cvxpy()
+        """Inertial parameters (10 * joints,) of the links, and all values (size,).
+
+        The unknowns are the scaled bodies' upper triangles, the payload's mass, and what is no inertial parameter.
+        """
+        base, links = self.structure.base, len(self.structure.arm)
         lengths = column_lengths(data.matrix)
-        triangle = np.linalg.qr(np.column_stack([data.matrix / lengths, data.torque]))[1]
-        size, base = self.structure.size, self.structure.base
-        links = [cp.Variable((4, 4), PSD=True) for _ in range(len(self.structure.arm))]
-        scales = self._scales()
-        inertial = cp.hstack([_inertial_parameters(cp, link, scale) for link, scale in zip(links, scales, strict=True)])
-        conditions = [link >> MIN_BODY_EIGENVALUE * np.eye(4) for link in links]
+        entries = _triangle_basis()
+        to_inertial = block_diag(*(_inertial_parameters(entries, scale) for scale in self._scales()))
         if self.pull.payload is not None:
-            mass = cp.Variable(nonneg=True)
-            inertial = inertial + mass * point_mass(len(links), self.pull.payload)
-        parts = [base.grouping @ inertial]
-        others = cp.Variable(size - len(base)) if size > len(base) else None
-        if others is not None:
-            parts.append(cp.multiply(others, 1 / lengths[len(base) :]))
-        values = cp.hstack(parts)
-        fitted = triangle[:, :size] @ cp.multiply(lengths, values)
-        noise = float(np.linalg.norm(triangle[:, size])) or 1.0
-        error = cp.sum_squares((fitted - triangle[:, size]) / noise)
-        pull = self._pull(cp, links, values) / noise**2
+            to_inertial = np.column_stack([to_inertial, point_mass(links, self.pull.payload)])
+        to_values = block_diag(base.grouping @ to_inertial, np.diag(1 / lengths[len(base) :]))
+        program = ConicProgram(to_values.shape[1])
+        bodies = np.zeros((links, program.size, 4, 4))
+        for link, matrices in enumerate(bodies):
+            matrices[10 * link : 10 * (link + 1)] = entries
+            program.require_semidefinite(matrices, -MIN_BODY_EIGENVALUE * np.eye(4))
+        if self.pull.payload is not None:
+            program.require_nonnegative(np.eye(1, program.size, 10 * links))
         rows = dissipation_rows(self.structure, self.fastest)
         if len(rows):
-            conditions.append((rows / np.abs(rows).max(axis=1, keepdims=True)) @ values >= 0)
-        minimise(cp, error + pull, conditions, "physically consistent parameters")
-        return np.asarray(inertial.value), np.asarray(values.value)
+            program.require_nonnegative(rows / np.abs(rows).max(axis=1, keepdims=True) @ to_values)
+        triangle = _qr_triangle(np.column_stack([data.matrix / lengths, data.torque]))[: len(lengths)]
+        tolerance = self.pull.size if self.pull.kind == "nominal" else WEAK_TOLERANCE
+        rotors, ones = self._rotor_pull(to_values)
+        factor = np.vstack([tolerance * triangle[:, :-1] * lengths @ to_values, rotors])
+        target = np.append(tolerance * triangle[:, -1], ones)
+        # The pull to the nominal body, the unit matrix here: twice its divergence, trace - log det - 4.
+        costs = 2 * np.trace(bodies.sum(axis=0), axis1=1, axis2=2)
+        for matrices in bodies:
+            logarithm = program.log_determinant(matrices)
+            costs = np.pad(costs, (0, len(logarithm) - len(costs))) - 2 * logarithm
+        found = program.solve(factor, target, costs)
+        if isinstance(found, str):
+            raise RuntimeError(f"no physically consistent parameters found: the solver says '{found}'")
+        return to_inertial @ found[: to_inertial.shape[1]], to_values @ found
 
     def _scales(self) -> Array:
         """Factors (joints, 4, 4) that bring each body near the unit matrix: S with body = S link S'."""
@@ -130,34 +139,27 @@ class PhysicalLeastSquares:
             return np.asarray(np.linalg.cholesky(regular_nominal(self.structure.arm)))
         return np.tile(np.diag(TYPICAL_BODY), (len(self.structure.arm), 1, 1))
 
-    def _pull(self, cp: Any, links: list[Any], values: Any) -> Any:
-        """Twice the divergence to the nominal bodies (the unit matrix here) over the squared tolerance."""
-        nominal = self.pull.kind == "nominal"
-        bodies = sum(2 * (cp.trace(link) - cp.log_det(link) - 4) for link in links)
-        rotors = [values[place] / inertia - 1 for place, inertia in nominal_rotors(self.structure)] if nominal else []
-        return (bodies + sum(cp.square(off) for off in rotors)) / (self.pull.size if nominal else WEAK_TOLERANCE) ** 2
+    def _rotor_pull(self, to_values: Array) -> tuple[Array, Array]:
+        """Rows that are one where rotors have their nominal inertia, and that one for each."""
+        rotors = nominal_rotors(self.structure) if self.pull.kind == "nominal" else []
+        rows = [to_values[place] / inertia for place, inertia in rotors]
+        return np.reshape(rows, (len(rows), to_values.shape[1])), np.ones(len(rows))
 
 
-def _inertial_parameters(cp: Any, link: Any, scale: Array) -> Any:
-    """Ten parameters, linear in the scaled pseudo-inertia."""
+def _qr_triangle(matrix: Array) -> Array:
+    return np.asarray(np.linalg.qr(matrix)[1])
+
+
+def _triangle_basis() -> Array:
+    """The symmetric matrices (10, 4, 4) of the entries of an upper triangle."""
+    rows, columns = np.triu_indices(4)
+    entries = np.zeros((10, 4, 4))
+    entries[np.arange(10), rows, columns] = entries[np.arange(10), columns, rows] = 1.0
+    return entries
+
+
+def _inertial_parameters(entries: Array, scale: Array) -> Array:
+    """Columns (10, 10): ten parameters of each scaled pseudo-inertia in entries."""
     gram = np.einsum("iab,jab->ij", pseudo_inertia_basis(), pseudo_inertia_basis())
     dual = np.einsum("ij,jab->iab", np.linalg.inv(gram), pseudo_inertia_basis())
-    turned = np.einsum("ab,iac,cd->ibd", scale, dual, scale)
-    return turned.reshape(10, 16) @ cp.vec(link, order="C")
-
-
-def load_cvxpy() -> Any:
-    """CVXPY; InputError, in one line, where it is not installed."""
-    try:
-        import cvxpy
-    except ImportError:
-        raise InputError("physically consistent parameters need CVXPY: pip install 'armlab[identify]'") from None
-    return cvxpy
-
-
-def minimise(cp: Any, objective: Any, conditions: list[Any], sought: str) -> None:
-    """Solves a convex problem: the variables hold the solution. RuntimeError where the solver finds none."""
-    task = cp.Problem(cp.Minimize(objective), conditions)
-    task.solve(solver=cp.CLARABEL)
-    if task.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
-        raise RuntimeError(f"no {sought} found: the solver says '{task.status}'")
+    return np.asarray(np.einsum("iac,eac->ie", dual, scale @ entries @ scale.T))

@@ -12,6 +12,7 @@ import pandas as pd
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError, in_one_line
+from armlab.common.packages import MissingPackageError
 from armlab.recordings.imports.matlab import table_of_arrays
 from armlab.recordings.imports.time_columns import NO_STAMP, find_stamp_format, seconds_of
 from armlab.recordings.table import HEADER_LINES, Table
@@ -37,7 +38,7 @@ def read_parquet(path: Path) -> FrameTable:
     try:
         from pyarrow import ArrowException, parquet
     except ImportError:
-        raise InputError(f"{path}: to read Parquet install pyarrow: pip install 'armlab[recordings]'") from None
+        raise MissingPackageError("pyarrow", f"{path}: Parquet") from None
     try:
         frame = parquet.read_table(path).to_pandas()
     except (ArrowException, OSError, ValueError) as error:

@@ -12,6 +12,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError, in_one_line
+from armlab.common.packages import MissingPackageError
 from armlab.recordings.table import HEADER_LINES, Table
 
 INFO = Path("meta/info.json")
@@ -85,7 +86,7 @@ def _read_columns(path: Path) -> dict[str, Array]:
     try:
         from pyarrow import ArrowException, parquet
     except ImportError:
-        raise InputError(f"{path}: to read Parquet install pyarrow: pip install 'armlab[recordings]'") from None
+        raise MissingPackageError("pyarrow", f"{path}: Parquet") from None
     try:
         table = parquet.read_table(path, columns=[COMMAND, STATE, STAMP, EPISODE])
         return {name: np.array(table[name].to_pylist(), dtype=np.float64) for name in table.column_names}

@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import IO, Any
 
 from armlab.common.errors import InputError, in_one_line
+from armlab.common.packages import MissingPackageError
 
 PACKED_SUFFIXES = (".gz", ".bz2", ".xz", ".zip", ".zst", ".zstd")
 
@@ -49,7 +50,7 @@ def _open(path: Path) -> IO[bytes] | Any:
     try:
         import zstandard
     except ImportError:
-        raise InputError(f"{path}: to unpack it install rosbags: pip install 'armlab[recordings]'") from None
+        raise MissingPackageError("zstandard", f"{path}: a .zst file") from None
     return zstandard.open(path, "rb")
 
 

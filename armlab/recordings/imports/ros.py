@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError, UndecidedError, in_one_line
+from armlab.common.packages import MissingPackageError
 from armlab.common.settings import suggest_name
 from armlab.recordings.imports.ros_messages import (
     COMMAND_TYPES,
@@ -125,7 +126,7 @@ def _read_series(
         from rosbags.serde import SerdeError
         from rosbags.typesys import Stores, get_types_from_msg, get_typestore
     except ImportError:
-        raise InputError(f"{path}: to read bags install rosbags: pip install 'armlab[recordings]'") from None
+        raise MissingPackageError("rosbags", f"{path}: a bag") from None
     store = get_typestore(Stores.ROS2_HUMBLE)
     for kind, text in DEFINITIONS.items():
         store.register(get_types_from_msg(text, kind))

@@ -45,7 +45,7 @@ class Separation:
 
 def separate(arms: Sequence[LikenessArm], seed: int = 0) -> Separation:
     """Trains and scores with arms left out; ValueError unless there are two arms of each side."""
-    from sklearn.ensemble import RandomForestClassifier  # of the extra `calibrate`
+    from sklearn.ensemble import RandomForestClassifier  # of the extra `proof`
 
     real = np.array([arm.real for arm in arms])
     if min(real.sum(), (~real).sum()) < 2:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.packages import install_line
 from armlab.diagnosis.motion.diagnose_motion import split_runs
 from armlab.diagnosis.motion.estimate import LOGARITHMIC, find_start, from_coordinates, to_coordinates
 from armlab.diagnosis.motion.motion_result import MotionDiagnosis
@@ -151,7 +152,7 @@ def import_sysid() -> Any:
     except ImportError:
         sysid = None
     if not hasattr(sysid, "optimize"):  # without the packages that it needs it imports, and is empty
-        raise InputError("mujoco.sysid is missing, which --peer sysid needs: pip install 'armlab[peers]'")
+        raise InputError(f"mujoco.sysid is missing, which --peer sysid needs: {install_line('peers')}")
     return sysid
 
 
