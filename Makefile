@@ -7,7 +7,7 @@ COMPILED := problem/kernel.c problem/kernel_build.py problem/spectra.c problem/s
 	armlab/proof/blind/servo/servo_arm.c armlab/proof/blind/servo/servo_arm_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 paper study search-space tune landscape best-known real real-leave-one-out real-motion real-conditioning relations prove-changes test suite lint structure table3-time diagnosis-time profile speed regression fuzz logs hostile prove prove-quick docs pictures lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study search-space tune landscape best-known real real-leave-one-out real-motion real-conditioning relations prove-changes test suite lint structure table3-time diagnosis-time profile speed regression fuzz logs hostile prove prove-quick docs pictures installs lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -101,6 +101,9 @@ docs: .venv/dev ## the documentation site, strictly: site/index.html
 pictures: .venv/dev ## the pictures of README and tutorials, docs/pictures/, and the outputs of the notebooks
 	$(BIN)/python -m tools.site.pictures
 	$(BIN)/python -m tools.site.notebooks
+
+installs: .venv/dev ## size and time of an installation per purpose: the table of docs/installation.md
+	$(BIN)/python -m tools.measure_installs
 
 # --- checks
 

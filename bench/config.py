@@ -58,9 +58,10 @@ Label = Annotated[str, AfterValidator(_check_label)]
 
 
 class AlgorithmChoice(Settings):
-    """An algorithm by its registered name, and the hyper-parameters that differ from its defaults.
+    """An algorithm; a bare name stands for one with its defaults.
 
-    label: its name in tables and figures.
+    name: its registered name (`armlab bench list`). label: its name in tables and figures. params: hyper-parameters
+    that differ from its defaults.
     """
 
     name: str
@@ -69,7 +70,11 @@ class AlgorithmChoice(Settings):
 
 
 class ProblemChoice(Settings):
-    """A problem as `problem.registry` reads it, and its name in tables and figures."""
+    """A problem; a bare name stands for a preset with its defaults.
+
+    label: its name in tables and figures. settings: in a file these keys stand beside `label`: `preset` and the keys
+    of that preset, as below.
+    """
 
     label: Label
     settings: dict[str, Any]
@@ -93,12 +98,16 @@ OneOrMany = Annotated[tuple[PositiveInt, ...], BeforeValidator(_to_tuple), Field
 class Experiment(Settings):
     """A comparison: every problem x algorithm x swarm size x budget x repetition.
 
-    iterations: budget of swarm_size * (iterations + 1) evaluations, the first population included; or evaluations: the
+    name: begins the names of the result files. problem: one or several, each a preset (`paper`), a suite (`suite-2`),
+    or keys with `preset:`. algorithms: those compared, by name or with `params`. swarm_size: points of a population,
+    one number or several. repetitions: runs of each algorithm on each problem, each with random numbers of its own.
+    seed: from which the random numbers of all runs follow. bounds: what happens to a point outside of the box.
+    iterations: budget of swarm_size * (iterations + 1) evaluations, the first population included. evaluations: the
     budget itself. derivative_price: evaluations that a point with its derivatives counts for; the dimension plus one,
     as by forward differences, if left out. output: the result files beside the table; a key with several values gives
     a figure against them without further ado. printed: show the paper's Table 3
-    beside ours. executor: where the trials run. trial_timeout_s: a trial that takes longer is ended. The last two
-    change no outcome.
+    beside ours. executor: where the trials run; it changes no outcome. trial_timeout_s: a trial that takes longer
+    is ended, s.
     """
 
     name: Annotated[str, Field(pattern=f"^{NAME_PATTERN}$")]

@@ -130,7 +130,11 @@ def to_rapid(trajectory: SampledTrajectory) -> str:
     """A RAPID module for a six-axis robot; axes that the arm lacks stay at zero. Raises InputError for another arm."""
     joints = trajectory.motion.joints
     if joints > ROBOT_AXES or "prismatic" in trajectory.kinds:
-        raise InputError(f"RAPID has six turning robot axes; {trajectory.name} moves {', '.join(trajectory.kinds)}")
+        sliding = trajectory.kinds.count("prismatic")
+        raise InputError(
+            f"a RAPID module moves at most {ROBOT_AXES} axes, all of them revolute: {trajectory.name} has {joints} "
+            f"joints, {sliding} of them prismatic; take --format csv or ros2"
+        )
     degrees = np.zeros((trajectory.motion.samples, ROBOT_AXES))
     degrees[:, :joints] = np.rad2deg(trajectory.motion.position)
     targets = (

@@ -39,7 +39,7 @@ class LimitSettings(Settings):
     """Limits in place of the robot file's: one number for all joints, or one a joint; rad (m), s, N m (N).
 
     position: `robot` keeps the file's; a list has one [lower, upper] a joint, or null where there is none.
-    torque: `none` drops the file's.
+    velocity: largest speed. acceleration: largest acceleration. torque: largest torque; `none` drops the file's.
     """
 
     position: Literal["robot"] | tuple[Range | None, ...] = "robot"
@@ -76,7 +76,11 @@ class LimitSettings(Settings):
 
 
 class WorkspaceSettings(Settings):
-    """Largest distance from the base, floor, and two opposite corners of a keep-out box; base frame, m."""
+    """Where the arm may be, in the base frame, m.
+
+    reach: largest distance from the base. floor: lowest height. keep_out: two opposite corners of a box that the arm
+    stays out of.
+    """
 
     reach: Positive | None = None
     floor: float | None = None
@@ -106,7 +110,12 @@ Count = Annotated[int, Ge(1)]
 
 
 class CriterionSettings(Settings):
-    """Eq. 44, D- or E-optimality; within limits the default weights add less than a tenth of cond."""
+    """What makes a motion good.
+
+    kind: eq. 44 of the paper, the determinant (D) or the smallest eigenvalue (E) of the information matrix.
+    weight_smallest: of the smallest singular value in eq. 44. weight_largest: of the largest one; within limits the
+    default weights add less than a tenth of the condition number.
+    """
 
     kind: Literal["eq44", "d_optimality", "e_optimality"] = "eq44"
     weight_smallest: NotNegative = 0.01
@@ -118,7 +127,10 @@ class CriterionSettings(Settings):
 
 
 class PenaltySettings(Settings):
-    """Penalty of a broken limit: step + weight * violation; the step outweighs any gain in the condition number."""
+    """Penalty of a broken limit: step + weight * violation.
+
+    step: outweighs any gain in the condition number. weight: for each unit of violation.
+    """
 
     step: NotNegative = 100.0
     weight: Positive = 1000.0
@@ -138,7 +150,8 @@ class ExcitationSettings(Settings):
     samples: instants, both ends included. columns: which columns are kept as base parameters, where there is
     a choice. unit_columns: scale columns to unit length. friction_columns: identify Coulomb friction, viscous friction
     and a torque offset of each joint, too, three columns a joint (`problem.friction`). tool: a point in the last link's
-    frame, m, that the workspace limits too. frame_seed: search in randomly shifted coordinates. penalty: or
+    frame, m, that the workspace limits too. frame_seed: search in randomly shifted coordinates. criterion: what
+    makes a motion good. limits: of the joints. workspace: where the arm may be. penalty: of broken limits, or
     `feasibility_rules` (Deb 2000). collisions: distances that the arm keeps from itself, a floor and boxes, at the
     samples with a margin for what lies between them (`problem.safe_motion`); not looked at if left out.
     """
@@ -237,6 +250,7 @@ class PaperLimitSettings(JointLimitSettings):
 class PaperSettings(ExcitationSettings):
     """The paper's problem: eq. 44-48 on the first three joints of the IRB 120.
 
+    harmonics: of the Fourier series.
     one_c: one c for all harmonics, as in the published optimum, or one each. centre: of the circle, m; the
     shoulder by default. radius_limit: of each a_k, m: their sum may just leave the reach of the wrist, 0.58 m.
     coefficient_limit: of b_k and c, m/s. rest: eq. 48 by a window on the Fourier part. elbow: branch of the
@@ -279,6 +293,7 @@ SearchSpace = Literal["coefficients", "feasible"]
 class JointFourierSettings(ExcitationSettings):
     """Finite Fourier series in joint space, five harmonics (Swevers 1997).
 
+    harmonics: of the series.
     coefficient_limit: of a_k and b_k, rad/s, one number or one a joint; the speed limit shared among the
     harmonics if left out. rest: start and end at rest. search_space: `coefficients` as they are, or `feasible`, where
     every point keeps the limits of position, velocity and acceleration. No acceleration limit is published: 40 rad/s2.
@@ -330,7 +345,11 @@ class RandomFrameSettings(JointFourierSettings):
 
 
 class FunctionSettings(Settings):
-    """A classical test function; shift_seed moves its optimum to a random place in the inner half of the box."""
+    """A classical test function.
+
+    dimension: number of unknowns. half_width: of the box about the origin. shift_seed: moves the optimum to a random
+    place in the inner half of the box.
+    """
 
     preset: Literal["sphere", "ellipsoid", "rosenbrock", "rastrigin", "ackley"]
     dimension: Count = 15

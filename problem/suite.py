@@ -27,6 +27,9 @@ class SuiteFile(Settings):
 class InstanceSettings(Settings):
     """A problem of a suite by its full name; only its criterion, its penalty and, in joint space, its search space can
     be chosen.
+
+    criterion: what makes a motion good. penalty: of broken limits, or `feasibility_rules`. search_space: `coefficients`
+    or `feasible`.
     """
 
     preset: str

@@ -86,7 +86,8 @@ def export_model(
     if missing:
         yield "not in the file: " + "; ".join(missing)
     if simulated.unclaimed:
-        yield f"no findings of the verdict, kept because the model predicts better: {'; '.join(simulated.unclaimed)}"
+        parts = "; ".join(simulated.unclaimed)
+        yield f"in the model because it predicts better with them, but not named by the verdict: {parts}"
     if simulated.thickened_links:
         yield f"given a little extent, as simulators want it: link {', '.join(map(str, simulated.thickened_links))}"
     return {

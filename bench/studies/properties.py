@@ -55,7 +55,7 @@ class AlgorithmProperties:
         if self.scale > MAX_PATH_DEVIATION:
             said.append("depends on the unit of its coordinates")
         if self.noise_p_value_reflect < MAX_BIAS_P_VALUE:
-            said.append("prefers places of the box without any reason")
+            said.append("favours some places of the search box even where the objective is pure noise")
         if self.noise_p_value_clip < MAX_BIAS_P_VALUE <= self.noise_p_value_reflect:
             said.append("piles up on clipped bounds")
         return "; ".join(said) or "no bias seen"

@@ -254,7 +254,7 @@ def test_a_trajectory_that_starts_in_motion_is_refused(tmp_path: Path) -> None:
 def test_a_seventh_axis_is_nothing_that_rapid_can_take() -> None:
     still = Motion(*(np.zeros((2, 7)) for _ in range(3)))
     trajectory = SampledTrajectory("seven", tuple("abcdefg"), ("revolute",) * 7, 10.0, still)
-    assert "RAPID has six turning robot axes" in refusal(to_rapid, trajectory)
+    assert "at most 6 axes, all of them revolute: seven has 7 joints, 0 of them" in refusal(to_rapid, trajectory)
     assert to_csv(trajectory).count("\n") == 3
     assert len(yaml.safe_load(to_ros2(trajectory))["points"]) == 2
 

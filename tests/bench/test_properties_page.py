@@ -42,7 +42,10 @@ def test_an_algorithm_that_is_drawn_to_the_origin_is_called_so_on_the_page(writt
         ({"translation": 0.1}, "depends on where the origin of coordinates lies"),
         ({"scale": 0.1}, "depends on the unit of its coordinates"),
         ({"noise_p_value_clip": 1e-9}, "piles up on clipped bounds"),
-        ({"noise_p_value_clip": 1e-9, "noise_p_value_reflect": 1e-9}, "prefers places of the box without any reason"),
+        (
+            {"noise_p_value_clip": 1e-9, "noise_p_value_reflect": 1e-9},
+            "favours some places of the search box even where the objective is pure noise",
+        ),
     ],
 )
 def test_each_bias_has_its_words(changed: dict[str, float], said: str) -> None:

@@ -91,7 +91,7 @@ def test_a_scale_that_differs_by_sign_is_a_wrong_gain_and_a_square_that_looks_li
 
 
 def lacking(found: Diagnosis) -> float:
-    """The log evidence that a wrong gain, which the search found, lacks of the best law."""
+    """By how much the log evidence of a wrong gain, which the search found, is below that of the best law."""
     own = next(each for each in found.weighed[0] if each.effect == "torque_gain_error")
     assert own.numbers["found searched"] == 1
     return float(np.expm1(own.numbers["found deficit"]))

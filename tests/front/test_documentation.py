@@ -122,6 +122,19 @@ def test_a_notebook_keeps_what_its_cells_showed_in_a_small_file(path):
     assert tempfile.gettempdir() not in text
 
 
+def test_what_the_readme_quotes_about_the_paper_stands_in_the_results():
+    quoted = re.findall(r'Measured here: "(.*)"', (ROOT / "README.md").read_text(encoding="utf-8"))
+    assert len(quoted) == 1
+    assert quoted[0] in (ROOT / "results" / "paper" / "replication.md").read_text(encoding="utf-8")
+
+
+def test_the_installation_of_a_diagnosis_is_small():
+    page = (ROOT / "docs" / "installation.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `([\w,]+)` \| \d+ \| (\d+) \|", page, re.MULTILINE))
+    assert {"diagnose", "harness", "motion"} <= set(rows)
+    assert int(rows["diagnose"]) <= 450  # MB
+
+
 def test_the_examples_of_readme_tutorials_and_python_run(tmp_path, monkeypatch):
     """All in one folder; a command that another document has, too, is run once."""
     monkeypatch.chdir(tmp_path)

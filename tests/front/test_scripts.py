@@ -212,3 +212,17 @@ def test_a_table_of_latex_escapes_what_latex_would_take_for_a_command():
         r"\midrule",
         r"50 \% & x\textbackslash{}y \\",
     ]
+
+
+@pytest.mark.parametrize("words", [("paper", "table3", "--dry-run"), ("run", "configs/suite.yaml", "--dry-run")])
+def test_a_command_takes_the_configurations_that_come_with_armlab_where_the_folder_has_none(words, here):
+    status, out, err = told(*words)
+    assert (status, err) == (0, "")
+    assert out
+    assert list(here.iterdir()) == []
+
+
+def test_a_configuration_of_the_folder_goes_before_the_one_that_comes_with_armlab(here):
+    (here / "configs").mkdir()
+    (here / "configs" / "table3.yaml").write_text("name: 3")
+    assert "name" in told("paper", "table3", "--dry-run")[2]

@@ -12,6 +12,7 @@ import pytest
 from armlab.cli.main import main
 from armlab.effects.example import HIDDEN
 from armlab.effects.library import BUILT_IN, WITHOUT_FAMILY
+from tools.site.formats import format_pages
 from tools.site.gallery import EXAMPLES
 
 ROOT = Path(__file__).parents[2]
@@ -75,6 +76,13 @@ def test_the_notebook_of_a_comparison_shows_its_experiment_as_a_table(site):
 
 def _tables(page):
     return re.findall(r"<table.*?</table>", page, re.DOTALL)
+
+
+def test_each_key_of_a_configuration_has_a_meaning():
+    page = format_pages()["reference/configuration.md"]
+    rows = re.findall(r"^\| `(\w+)` \|(.*)\|$", page, re.MULTILINE)
+    assert len(rows) > 60
+    assert {key for key, cells in rows if not cells.rsplit("|", 1)[-1].strip() or cells.count("|") < 2} == set()
 
 
 def test_each_effect_has_a_law_and_an_example():

@@ -143,7 +143,7 @@ def test_a_number_that_is_no_finding_is_written_and_told(tmp_path: Path) -> None
     model = replace(model, unclaimed=frozenset({rotor, offset}))
     lines = list(export_model(model.save(tmp_path / "model.yaml"), tmp_path / "arm.xml"))
     inertia = float(model.values[model.structure.slices[rotor]][0])
-    told = "no findings of the verdict, kept because the model predicts better: "
+    told = "in the model because it predicts better with them, but not named by the verdict: "
     assert told + f"rotor inertia at joint 2 ({inertia:.3g} kg m²)" in lines
     assert f'armature="{inertia!r}"' in (tmp_path / "arm.xml").read_text()
 

@@ -13,6 +13,7 @@ from tools.site.commands import command_pages
 from tools.site.formats import format_pages
 from tools.site.gallery import gallery_pages
 from tools.site.interface import interface_pages
+from tools.site.method_pictures import method_pictures, with_picture
 
 ROOT = Path(__file__).parents[2]
 FROM_ROOT = {
@@ -42,8 +43,9 @@ def write_source(folder: Path) -> None:
     pages |= {name: folder / page for name, page in FROM_ROOT.items()}
     for name, page in pages.items():
         text = (ROOT / name).read_text(encoding="utf-8")
-        page.write_text(follow_links(text, name, page.relative_to(folder).as_posix()), encoding="utf-8")
-    for generated in (gallery_pages, command_pages, format_pages, interface_pages):
+        text = follow_links(text, name, page.relative_to(folder).as_posix())
+        page.write_text(with_picture(page.stem, text) if page.parent == folder else text, encoding="utf-8")
+    for generated in (method_pictures, gallery_pages, command_pages, format_pages, interface_pages):
         for path, content in generated().items():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_bytes(content if isinstance(content, bytes) else content.encode())

@@ -9,6 +9,7 @@ from typing import Any
 
 from algorithms.registry import load, names, names_with_derivatives
 from armlab.common.markdown import markdown_page, markdown_table
+from armlab.common.settings import Settings
 from armlab.diagnosis.tuning import tuning_page
 from armlab.schemas import FORMATS
 from bench.config import Experiment
@@ -84,7 +85,8 @@ def _tables(schema: Mapping[str, Any], level: int = 2) -> Iterator[str]:
 def _object(schema: Mapping[str, Any]) -> Iterator[str]:
     """The description of an object and the table of its keys."""
     keys = schema.get("properties", {})
-    text, meanings = split_description(schema.get("description", ""), list(keys))
+    text, own = split_description(schema.get("description", ""), list(keys))
+    meanings = SHARED_MEANINGS | inherited_meanings(schema.get("title", ""), list(keys)) | own
     if text:
         yield _escape(text)
     rows = [
@@ -100,6 +102,23 @@ def _object(schema: Mapping[str, Any]) -> Iterator[str]:
         yield markdown_table(("key", "holds", "if left out", "meaning"), rows)
     elif rows:
         yield markdown_table(("key", "holds", "if left out"), [row[:3] for row in rows])
+
+
+SHARED_MEANINGS = {"preset": "the name of the problem"}
+
+
+def inherited_meanings(title: str, keys: Sequence[str]) -> dict[str, str]:
+    """What the settings that a model inherits from say of its keys; the nearest one counts."""
+    named = [each for each in _subclasses(Settings) if each.__name__ == title]
+    bases = [base for each in named for base in reversed(each.__mro__[1:]) if issubclass(base, Settings)]
+    said = [split_description(inspect.getdoc(base) or "", keys)[1] for base in bases if base is not Settings]
+    return {name: text for meanings in said for name, text in meanings.items()}
+
+
+def _subclasses(model: type) -> Iterator[type]:
+    for each in model.__subclasses__():
+        yield each
+        yield from _subclasses(each)
 
 
 def split_description(text: str, keys: Sequence[str]) -> tuple[str, dict[str, str]]:

@@ -204,10 +204,17 @@ def _index_page() -> str:
     for facts in (*(family.facts for family in BUILT_IN), *SERVO_EFFECTS):
         causes.setdefault(facts.cause, []).append(facts)
     for cause, effects in causes.items():
-        rows = [(f"[{each.words}]({each.id}.md)", each.meaning) for each in effects]
-        parts += [f"## {cause[0].upper()}{cause[1:]}", markdown_table(("effect", "what it is"), rows)]
+        parts += [f"## {cause[0].upper()}{cause[1:]}", "\n\n".join(_card(each) for each in effects)]
     ids = [each.id for effects in causes.values() for each in effects]
     return markdown_page("Gallery of effects", *parts, toctree(ids, hidden=True))
+
+
+def _card(facts: Effect) -> str:
+    """A thumbnail, where the effect has a picture, beside its name and what it is."""
+    words = f"[{facts.words}]({facts.id}.md): {facts.meaning}."
+    if facts.id not in EXAMPLES:
+        return f":::{{container}} effect-card\n{words}\n:::"
+    return f":::{{container}} effect-card\n[![torque of {facts.words}]({facts.id}.svg)]({facts.id}.md)\n\n{words}\n:::"
 
 
 def _title(facts: Effect) -> str:
@@ -251,8 +258,9 @@ def _confusions(facts: Effect) -> list[str]:
     if rivals:
         rows = [(_link(name), f"{cosine:.3f}") for name, cosine in rivals]
         parts.append(
-            "On the motion of the picture, links exactly known, these effects at some place come nearest to it at "
-            "some place of its own. One means: no amount of such data tells them apart."
+            "How similar other effects are to this one on the motion of the picture, if the links are known exactly: "
+            "the largest cosine between their torques, over all joints where each can be. At a cosine of 1, no amount "
+            "of data from such a motion tells the two apart."
         )
         parts.append(markdown_table(("effect", "cosine"), rows))
     else:

@@ -1,6 +1,7 @@
 """`python -m tools.site.pictures`: makes the pictures of README and tutorials anew, in docs/pictures/.
 
-The tutorials are run as they stand, and their figures are taken; Table 3 is drawn from results/table3.csv.
+The tutorials and the comparison of the README are run as they stand, and their figures are taken; the first screen of
+the tutorial's report is photographed in Chromium. Table 3 is drawn from results/table3.csv.
 """
 
 import contextlib
@@ -18,23 +19,49 @@ from tools.site.examples import read_steps, run_step
 
 ROOT = Path(__file__).parents[2]
 PICTURES = ROOT / "docs" / "pictures"
-FROM_TUTORIALS = {
-    "csv.md": {"diagnosis.svg": "verdict/figures/torque_joint2.svg", "errors.svg": "verdict/figures/errors.svg"},
-    "algorithm.md": {"ends.svg": "figures/comparison_ends.svg"},
+FROM_DOCUMENTS = {
+    "docs/tutorials/csv.md": {
+        "diagnosis.svg": "verdict/figures/torque_joint2.svg",
+        "errors.svg": "verdict/figures/errors.svg",
+        "report.png": "verdict/report.html",
+    },
+    "docs/tutorials/algorithm.md": {"ends.svg": "figures/comparison_ends.svg"},
+    "README.md": {"convergence.svg": "results/mine_joint-fourier.svg"},
 }
 
 
+WINDOW = {"width": 1000, "height": 530}  # px: what a reader sees first
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+
 def make_pictures() -> None:
-    """Makes all pictures; those of a tutorial in a folder of its own."""
+    """Makes all pictures; those of a document in a folder of its own."""
     PICTURES.mkdir(exist_ok=True)
-    for document, pictures in FROM_TUTORIALS.items():
+    for document, pictures in FROM_DOCUMENTS.items():
         with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
-            for step in read_steps(ROOT / "docs" / "tutorials" / document):
-                print(step.path or step.text.splitlines()[0])
-                run_step(step)
+            for step in read_steps(ROOT / document):
+                if document != "README.md" or "mine.yaml" in step.path + step.text:  # a tutorial has its other steps
+                    print(step.path or step.text.splitlines()[0])
+                    run_step(step)
             for name, place in pictures.items():
-                shutil.copyfile(place, PICTURES / name)
+                if name.endswith(".png"):
+                    photograph(Path(place).absolute(), PICTURES / name)
+                else:
+                    shutil.copyfile(place, PICTURES / name)
     (PICTURES / "table3.svg").write_bytes(draw_table3(pd.read_csv(ROOT / "results" / "table3.csv")))
+
+
+def photograph(page: Path, picture: Path) -> None:
+    """The first screen of a page as PNG."""
+    from playwright.sync_api import sync_playwright
+
+    browser_path = next(filter(None, map(shutil.which, BROWSERS)))
+    with sync_playwright() as session:
+        browser = session.chromium.launch(executable_path=browser_path, args=["--no-sandbox"])
+        opened = browser.new_page(viewport=WINDOW)
+        opened.goto(page.as_uri())
+        opened.screenshot(path=picture)
+        browser.close()
 
 
 def draw_table3(table: pd.DataFrame) -> bytes:

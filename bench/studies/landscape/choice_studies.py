@@ -189,8 +189,9 @@ def space_section(sources: Sources) -> Iterator[str]:
         rows.append(cells)
     yield markdown_table(["algorithm", "mean ratio", *problems], rows, range(1, len(problems) + 2))
     yield (
-        "The best of each: in the space, the ratio of the best in the coefficients to it, and in the space the ratio "
-        "of the best without derivatives to the best with them."
+        "The best algorithm on each problem in the feasible space, without and with derivatives. *ratio*: the best in "
+        "the coefficients divided by it. *without to with*: the best without derivatives divided by the best with "
+        "them, both in the feasible space."
     )
     winners = {
         (asking, feasible): _least_by_problem(sources, asking=asking, feasible=feasible)
