@@ -211,7 +211,7 @@ def _index_page() -> str:
 
 def _card(facts: Effect) -> str:
     """A thumbnail, where the effect has a picture, beside its name and what it is."""
-    words = f"[{facts.words}]({facts.id}.md): {facts.meaning}."
+    words = f"[{_title(facts)}]({facts.id}.md): {facts.meaning}."
     if facts.id not in EXAMPLES:
         return f":::{{container}} effect-card\n{words}\n:::"
     return f":::{{container}} effect-card\n[![torque of {facts.words}]({facts.id}.svg)]({facts.id}.md)\n\n{words}\n:::"

@@ -120,11 +120,12 @@ def draw_change(axes: Axes) -> None:
 def draw_servo(axes: Axes) -> None:
     """A servo of 4 Hz that answers its command 39 ms late, and the simulation without the delay."""
     time = np.arange(0, SHOWN_S, 0.002)
-    command = np.sin(2 * np.pi * 0.7 * time) * (time > 0.3)
-    natural, late = 2 * np.pi * 4, round(0.039 / 0.002)
+    command = np.sin(2 * np.pi * 0.7 * np.maximum(time - 0.3, 0))
+    natural = 2 * np.pi * 4
+    late_command = np.interp(time - 0.039, time, command)
     servo = ([natural**2], [1.0, 1.4 * natural, natural**2])
     _line(axes, 3, time, command, "command")
-    _line(axes, 0, time, lsim(servo, np.roll(command, late), time)[1], "measured")
+    _line(axes, 0, time, lsim(servo, late_command, time)[1], "measured")
     _line(axes, 1, time, lsim(servo, command, time)[1], "simulated")
     axes.set(xlabel="time (s)", ylabel="position (rad)")
 
