@@ -62,7 +62,7 @@ def _svg(picture: Picture) -> bytes:
         def fill(figure: Figure) -> None:
             axes = figure.subplots()
             draw(axes)
-            axes.legend(loc="upper right")
+            figure.legend(loc="outside upper center", ncols=3)
 
         return render_figure((7.2, 2.8), fill, ("svg",))["svg"]
     own = Path(picture.source)
