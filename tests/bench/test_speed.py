@@ -1,5 +1,7 @@
 """The speed report measures what it says; no test here asserts a time."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,8 @@ from bench.studies.speed.evaluations import (
     with_joint_frames,
 )
 from bench.studies.speed.report import speed_page
-from problem.regressor import rigid_body_torque
+from problem.base_parameters import base_parameters
+from problem.regressor import gram_matrix, rigid_body_torque
 from problem.robot_file import load_arm
 
 
@@ -32,6 +35,19 @@ def test_every_pipeline_gives_pinocchios_matrices_and_condition_numbers(arm: str
     figures = compare_pipelines(arm, rounds=1)
     assert figures.matrices_apart < 1e-10
     assert figures.results_apart < 1e-7  # as near as the eigenvalues of a Gram matrix come (see problem/fitness.py)
+
+
+@pytest.mark.parametrize("samples", [3, 8, 21])
+def test_the_code_built_by_hand_sums_the_products_of_any_number_of_samples(samples: int, tmp_path: Path) -> None:
+    pytest.importorskip("casadi", reason="CasADi is not installed")
+    from bench.studies.speed.four_lanes import compile_gram_matrices, cpp_compiler
+
+    if cpp_compiler() is None:
+        pytest.skip("there is no C++ compiler")
+    arm = with_joint_frames(load_arm("irb120-arm"))
+    columns, motion = base_parameters(arm).columns, random_motions(arm, 2, samples)
+    gram = gram_matrix(arm, motion, columns)
+    np.testing.assert_allclose(compile_gram_matrices(arm, columns, tmp_path)(motion), gram, atol=1e-12 * gram.max())
 
 
 def test_armlabs_share_of_the_anchor_is_that_of_the_same_way_of_calling() -> None:

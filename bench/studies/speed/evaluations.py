@@ -27,7 +27,7 @@ from problem.spectrum import find_spectrum, spectra_of_gram_matrices
 
 POPULATION_SIZE = 50
 PIPELINE_SAMPLES = 100
-PIPELINE_ROUNDS = 15
+PIPELINE_ROUNDS = 31
 PINOCCHIO_ORDER = (0, 1, 2, 3, 4, 6, 9, 5, 7, 8)  # m, mc, Ixx Ixy Iyy Ixz Iyz Izz: where each of eq. 31 stands
 
 

@@ -42,12 +42,8 @@ static inline void regressor(const v4 *q, const v4 *qd, const v4 *qdd, v4 *out) 
 }}
 
 static inline void load(long long left, const double *from, v4 *to) {{
-    const double *a = from, *b = a + {joints}, *c = b + {joints}, *d = c + {joints};
     for (int j = 0; j < {joints}; j++)
-        if (left >= 4)
-            to[j] = (v4){{a[j], b[j], c[j], d[j]}};
-        else
-            for (int l = 0; l < 4; l++) to[j][l] = l < left ? from[l * {joints} + j] : 0;
+        for (int l = 0; l < 4; l++) to[j][l] = l < left ? from[l * {joints} + j] : 0;
 }}
 
 static const int first[] = {{{first}}};
