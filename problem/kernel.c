@@ -382,16 +382,19 @@ void series(int orders, int64_t trajectories, int64_t samples, int joints, int t
             const double *coefficients, double *out) {
     for (int order = 0; order < orders; order++, basis += samples * terms)
         for (int64_t p = 0; p < trajectories; p++, out += samples * joints) {
-            const double *own = coefficients + p * joints * terms;
-            for (int64_t s = 0; s < samples; s += LANES) {
-                int count = at_most_lanes(samples - s);
-                V sums[MAX_JOINTS] = {{0}}, value;
-                for (int k = 0; k < terms; k++) {
-                    load(1, count, terms, basis + s * terms + k, &value);
-                    for (int j = 0; j < joints; j++) sums[j] += value * own[j * terms + k];
+            for (int from = 0; from < joints; from += MAX_JOINTS) {
+                const double *own = coefficients + (p * joints + from) * terms;
+                int some = joints - from < MAX_JOINTS ? joints - from : MAX_JOINTS;
+                for (int64_t s = 0; s < samples; s += LANES) {
+                    int count = at_most_lanes(samples - s);
+                    V sums[MAX_JOINTS] = {{0}}, value;
+                    for (int k = 0; k < terms; k++) {
+                        load(1, count, terms, basis + s * terms + k, &value);
+                        for (int j = 0; j < some; j++) sums[j] += value * own[j * terms + k];
+                    }
+                    for (int l = 0; l < count; l++)
+                        for (int j = 0; j < some; j++) out[(s + l) * joints + from + j] = sums[j][l];
                 }
-                for (int l = 0; l < count; l++)
-                    for (int j = 0; j < joints; j++) out[(s + l) * joints + j] = sums[j][l];
             }
         }
 }

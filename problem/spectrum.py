@@ -76,15 +76,17 @@ def spectra_of_gram_matrices(gram: Array) -> tuple[Spectrum, int]:
     """The spectra of matrices W whose Gram matrices W' W are given, (points, n, n), and how many are not known.
 
     These are not numbers: where a Gram matrix is not positive definite, or the condition number above
-    MAX_GRAM_CONDITION.
+    MAX_GRAM_CONDITION. Raises ValueError for more than MAX_COLUMNS columns, or none.
     """
     points, size, _ = gram.shape
+    if not 0 < size <= MAX_COLUMNS:
+        raise ValueError(f"a Gram matrix should have 1 to {MAX_COLUMNS} columns, not {size}")
     scratch, out = np.empty(_LANES * (size**2 + 1)), np.empty((4, points))
     unknown = lib.spectra(points, size, pointer(gram), MAX_GRAM_CONDITION, pointer(scratch), pointer(out))
     return Spectrum(out[0], out[1], out[2], out[3]), unknown
 
 
-_LANES = 4  # as in spectra.c
+MAX_COLUMNS, _LANES = 208, 4  # as in spectra.c
 
 
 def _singular_values(

@@ -59,8 +59,8 @@ def sample_instants(duration: float, samples: int) -> Array:
 def series(basis: Array, coefficients: Array) -> Array:
     """Sums of basis functions, the same to the bit in any batch.
 
-    basis: (orders, samples, terms), functions and their derivatives; coefficients: (points, joints, terms), of up to
-    MAX_JOINTS. Returns (orders, points, samples, joints).
+    basis: (orders, samples, terms), functions and their derivatives; coefficients: (points, joints, terms).
+    Returns (orders, points, samples, joints).
     """
     basis = np.ascontiguousarray(basis)
     coefficients = np.ascontiguousarray(coefficients)

@@ -13,7 +13,7 @@ from problem.base_parameters import base_parameters
 from problem.motion import Motion
 from problem.regressor import observation_matrix
 from problem.robot_file import built_in_arms, load_arm
-from problem.spectrum import MAX_GRAM_CONDITION, Spectrum, find_spectrum, spectra_of_gram_matrices
+from problem.spectrum import MAX_COLUMNS, MAX_GRAM_CONDITION, Spectrum, find_spectrum, spectra_of_gram_matrices
 
 ARM = load_arm("irb120-arm")
 COLUMNS = base_parameters(ARM).columns
@@ -162,6 +162,12 @@ def test_a_matrix_that_is_not_definite_enough_has_no_spectrum_and_spoils_no_othe
     for part, whole in zip(found, expected, strict=True):
         assert np.isnan(part[2])
         assert np.array_equal(part[others], whole[others])
+
+
+@pytest.mark.parametrize("columns", [0, MAX_COLUMNS + 1])
+def test_a_matrix_without_columns_or_with_too_many_is_refused(columns: int) -> None:
+    with pytest.raises(ValueError, match=f"should have 1 to 208 columns, not {columns}"):
+        spectra_of_gram_matrices(np.ones((1, columns, columns)))
 
 
 @pytest.mark.parametrize("cut", range(1, 7))

@@ -9,7 +9,7 @@ from problem.arm import Arm, body_points, link_poses
 from problem.inverse_kinematics import planar_arm
 from problem.motion import Motion
 from problem.robot_file import load_arm
-from problem.trajectories import CartesianFourier, JointFourier, Trajectory, sample_instants
+from problem.trajectories import CartesianFourier, JointFourier, Trajectory, sample_instants, series
 
 ARM = load_arm("irb120-arm")
 TOOL = np.array([0.0, 0.0, 0.374])
@@ -94,6 +94,14 @@ def test_a_joint_series_is_swevers_sum() -> None:
     expected = 1.0 + 0.3 * np.sin(w * t) / w + 0.2 * np.sin(4 * w * t) / (4 * w) - 0.5 * np.cos(2 * w * t) / (2 * w)
     np.testing.assert_allclose(motion.position[0, :, 0], expected, rtol=1e-13)
     assert np.all(motion.position[0, :, 1] == 0)
+
+
+@pytest.mark.parametrize(("joints", "samples"), [(1, 1), (3, 10), (16, 8), (37, 5)])
+def test_a_series_is_the_sum_of_its_terms_for_any_number_of_joints_and_samples(joints: int, samples: int) -> None:
+    rng = np.random.default_rng(0)
+    basis, coefficients = rng.normal(size=(3, samples, 7)), rng.normal(size=(4, joints, 7))
+    expected = np.einsum("osk,pjk->opsj", basis, coefficients)
+    np.testing.assert_allclose(series(basis, coefficients), expected, rtol=0, atol=1e-14)
 
 
 def test_the_box_and_the_names_of_a_joint_series_go_joint_by_joint() -> None:
