@@ -376,27 +376,32 @@ void torques(int joints, const JointData *data, const double *gravity, int64_t s
 }
 
 /* Sums of basis functions: out (orders, trajectories, samples, joints) = sum over k of
- * basis (orders, samples, terms) * coefficients (trajectories, joints, terms). */
+ * basis (orders, samples, terms) * coefficients (trajectories, joints, terms). scratch: terms * (samples + 2 * LANES). */
 FOR_EACH_PROCESSOR
 void series(int orders, int64_t trajectories, int64_t samples, int joints, int terms, const double *basis,
-            const double *coefficients, double *out) {
-    for (int order = 0; order < orders; order++, basis += samples * terms)
-        for (int64_t p = 0; p < trajectories; p++, out += samples * joints) {
+            const double *coefficients, double *scratch, double *out) {
+    V *values = (V *)(((uintptr_t)scratch + sizeof(V) - 1) & ~(uintptr_t)(sizeof(V) - 1)); /* [block][term] */
+    for (int order = 0; order < orders; order++, basis += samples * terms) {
+        for (int64_t s = 0; s < samples; s += LANES)
+            load(terms, at_most_lanes(samples - s), terms, basis + s * terms, values + s / LANES * terms);
+        for (int64_t p = 0; p < trajectories; p++, out += samples * joints)
             for (int from = 0; from < joints; from += MAX_JOINTS) {
                 const double *own = coefficients + (p * joints + from) * terms;
                 int some = joints - from < MAX_JOINTS ? joints - from : MAX_JOINTS;
                 for (int64_t s = 0; s < samples; s += LANES) {
-                    int count = at_most_lanes(samples - s);
-                    V sums[MAX_JOINTS] = {{0}}, value;
-                    for (int k = 0; k < terms; k++) {
-                        load(1, count, terms, basis + s * terms + k, &value);
-                        for (int j = 0; j < some; j++) sums[j] += value * own[j * terms + k];
+                    const V *value = values + s / LANES * terms;
+                    V sums[MAX_JOINTS];
+                    for (int j = 0; j < some; j++) {
+                        V sum = {0};
+                        for (int k = 0; k < terms; k++) sum += value[k] * own[j * terms + k];
+                        sums[j] = sum;
                     }
+                    int count = at_most_lanes(samples - s);
                     for (int l = 0; l < count; l++)
                         for (int j = 0; j < some; j++) out[(s + l) * joints + from + j] = sums[j][l];
                 }
             }
-        }
+    }
 }
 
 INLINE V blend(I where, V chosen, V other) { return (V)(((I)chosen & where) | ((I)other & ~where)); }

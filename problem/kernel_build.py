@@ -22,7 +22,7 @@ int64_t gram_scratch(int joints, int n);
 void torques(int joints, const JointData *data, const double *gravity, int64_t samples, const double *q,
     const double *qd, const double *qdd, const double *parameters, double *out);
 void series(int orders, int64_t trajectories, int64_t samples, int joints, int terms, const double *basis,
-    const double *coefficients, double *out);
+    const double *coefficients, double *scratch, double *out);
 void series_extremes(int64_t trajectories, int64_t samples, int joints, int terms, const double *basis,
     const double *coefficients, double *out);
 void peaks(int64_t trajectories, int64_t samples, int joints, const double *q, const double *qd,

@@ -1,5 +1,6 @@
 """Limits of the arm and of its workspace, and how far a motion exceeds them."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,7 +30,7 @@ class Workspace:
     @property
     def limited(self) -> bool:
         """Whether any limit is finite."""
-        return np.isfinite(self.reach) or np.isfinite(self.floor) or self.keep_out is not None
+        return math.isfinite(self.reach) or math.isfinite(self.floor) or self.keep_out is not None
 
     def excess(self, points: Array) -> Array:
         """How far points (batch, samples, points, 3) leave the workspace at worst, (batch,), m."""

@@ -66,9 +66,13 @@ def series(basis: Array, coefficients: Array) -> Array:
     coefficients = np.ascontiguousarray(coefficients)
     points, joints, terms = coefficients.shape
     orders, samples, _ = basis.shape
-    out = np.empty((orders, points, samples, joints))
-    lib.series(orders, points, samples, joints, terms, pointer(basis), pointer(coefficients), pointer(out))
+    scratch, out = np.empty(terms * (samples + 2 * _LANES)), np.empty((orders, points, samples, joints))
+    arrays = (pointer(array) for array in (basis, coefficients, scratch, out))
+    lib.series(orders, points, samples, joints, terms, *arrays)
     return out
+
+
+_LANES = 4  # as in kernel.c
 
 
 def fourier_terms(times: Array, duration: float, harmonics: int) -> Array:
