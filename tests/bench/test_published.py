@@ -89,3 +89,10 @@ def test_mistakes_are_refused_in_one_line(changed: Callable[..., Path], tmp_path
     assert "has 7 joints, 'unisa-ur10' has 6" in refusal(judge_published, other, PLAN, RECORDS)
     nothing = tmp_path / "nothing.json"
     assert "has no record of 'panda-13s-si'" in refusal(judge_published, changed(), PLAN, nothing)
+
+
+def test_no_record_has_a_smaller_determinant_than_the_least_one_known() -> None:
+    rows = [line.split(" | ") for line in (ROOT / "results" / "published" / "records.md").read_text().splitlines()]
+    compared = [(float(row[2]), float(row[3])) for row in rows if len(row) == 10 and row[3][0].isdigit()]
+    assert len(compared) >= 10
+    assert all(least <= determinant for determinant, least in compared)

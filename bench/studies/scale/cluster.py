@@ -5,6 +5,7 @@ one interpreter with all others and with the scheduler. So the cost of a batch t
 scheduler and its messages cost on a cluster, where workers have processors of their own.
 """
 
+import logging
 import os
 import resource
 import time
@@ -47,6 +48,7 @@ class SimulatedCluster:
 
 def simulate_clusters(config: Path, sizes: Sequence[int], tell: ReportProgress) -> list[SimulatedCluster]:
     """Clusters of several sizes, one after the other; tell: is called with a line about each."""
+    logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)  # what closing a crowd of workers says
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
     found = []
