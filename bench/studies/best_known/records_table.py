@@ -77,10 +77,11 @@ _INTRODUCTION = """The records of `results/best_known.json` whose motions are Fo
 the condition number of the observation matrix W. *det*: det(W'W)^(-1/n) for n columns, what D-optimality makes small;
 *least det*: the least one known under the same limits, of the record whose name ends in `-d`. *position*, *speed*,
 *acceleration*: the largest share of the limit that is used at any instant, by the bound of Ehlich and Zeller 1964.
-Records of suites 2 and 3 keep the limits at their samples, so that a little more may be used between them. *itself*,
-*floor*: the least distance of links two or more joints apart, and of links from the floor, at the poses of a proof
-that 20 mm are kept at every instant (conservative advancement, Mirtich 1996, distances by MuJoCo); "-" where
-collisions are not looked at. A test holds the same distances beside those of Pinocchio and Coal.
+Records of suites 2 and 3 keep the limits at their samples, so that a little more may be used between them; those of
+suite 4 keep everything at every instant. *itself*, *floor*: the least distance of links two or more joints apart, and
+of links from the floor, at the poses of a proof that 19 mm are kept at every instant (conservative advancement,
+Mirtich 1996, distances by MuJoCo); "-" where collisions are not looked at. A test holds the same distances beside
+those of Pinocchio and Coal.
 
 `armlab bench submit trajectory.yaml` recomputes a trajectory of yours for any of these problems, refuses it where it
 breaks a limit or collides at any instant, and prints its row."""
