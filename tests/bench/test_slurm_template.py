@@ -1,4 +1,6 @@
-"""The sweep on a Slurm cluster, as the template sends it, with local processes in place of the jobs."""
+"""The sweep on a Slurm cluster, as the template sends it, with local processes in place of the jobs; and simulated
+workers.
+"""
 
 import os
 import subprocess
@@ -7,6 +9,8 @@ from pathlib import Path
 
 from bench.run import load_experiment
 from bench.store import open_store
+from bench.studies.scale.cluster import simulate_clusters
+from bench.studies.scale.report import cluster_page
 
 ROOT = Path(__file__).parents[2]
 CONFIG = """\
@@ -47,3 +51,15 @@ def test_the_template_runs_a_sweep_on_the_workers_of_its_jobs(tmp_path: Path) ->
     with open_store(tmp_path / "runs.sqlite") as store:
         assert all(store.has(entry.key) for entry in load_experiment(tmp_path / "sweep.yaml").entries)
     assert (tmp_path / "results" / "sweep.csv").exists()
+
+
+def test_simulated_workers_cost_something_and_break_nothing() -> None:
+    told: list[str] = []
+    (found,) = simulate_clusters(ROOT / "configs" / "scale.yaml", [2], told.append)
+    assert found.failure == ""
+    assert found.dask_ms > found.dispatch_ms > 0
+    assert found.files > 0
+    assert len(told) == 1
+    page = cluster_page([found])
+    assert "| what broke | nothing |" in page
+    assert "2 workers" in page

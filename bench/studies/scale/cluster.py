@@ -24,7 +24,8 @@ from bench.run import load_experiment
 from bench.studies.scale.sweeps import ReportProgress, resident_mb
 
 BATCHES_PER_WORKER = 2  # of one small trial each
-START_TIMEOUT_S = 300.0
+JOINING = 50  # workers at a time: 1,000 at once time out after 30 s, since one interpreter has to greet them all
+START_TIMEOUT_S = 120.0  # of these
 
 
 @dataclass(frozen=True)
@@ -71,16 +72,18 @@ def _simulate(config: Path, workers: int) -> SimulatedCluster:
     try:
         with (
             LocalCluster(
-                n_workers=workers,
+                n_workers=0,
                 processes=False,
                 threads_per_worker=1,
                 protocol="tcp",
                 memory_limit=None,
-                dashboard_address=None,
+                dashboard_address=":0",
             ) as cluster,
             Client(cluster) as client,
         ):
-            client.wait_for_workers(workers, timeout=START_TIMEOUT_S)
+            for count in range(min(JOINING, workers), workers + 1, min(JOINING, workers)):
+                cluster.scale(count)
+                client.wait_for_workers(count, timeout=START_TIMEOUT_S)
             started = time.perf_counter() - began
             with dask_executor(cluster.scheduler_address, 1, None) as executor:
                 through = _batch_ms(batches, executor)
