@@ -10,7 +10,7 @@ import os
 import resource
 import time
 from collections.abc import Sequence
-from concurrent.futures import Future
+from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -23,7 +23,7 @@ from bench.executors.dask_cluster import dask_executor
 from bench.run import load_experiment
 from bench.studies.scale.sweeps import ReportProgress, resident_mb
 
-BATCHES_PER_WORKER = 2  # of one small trial each
+BATCHES = 400  # of one small trial each
 JOINING = 50  # workers at a time: 1,000 at once time out after 30 s, since one interpreter has to greet them all
 START_TIMEOUT_S = 120.0  # of these
 
@@ -60,7 +60,7 @@ def simulate_clusters(config: Path, sizes: Sequence[int], tell: ReportProgress) 
 
 
 def _simulate(config: Path, workers: int) -> SimulatedCluster:
-    entries = islice(load_experiment(config).entries, BATCHES_PER_WORKER * workers)
+    entries = islice(load_experiment(config).entries, BATCHES)
     batches: list[Work] = [[(entry.key, entry.trial)] for entry in entries]
     began = time.perf_counter()
     for work in batches[:100]:
@@ -89,6 +89,8 @@ def _simulate(config: Path, workers: int) -> SimulatedCluster:
                 through = _batch_ms(batches, executor)
             more = resident_mb(os.getpid()) - memory, _open_files() - files
         return SimulatedCluster(workers, search, dispatch, started, through, *more)
+    except CancelledError:
+        return SimulatedCluster(workers, search, dispatch, failure="the command lost its connection to the scheduler")
     except (OSError, TimeoutError, RuntimeError) as error:
         return SimulatedCluster(workers, search, dispatch, failure=f"{type(error).__name__}: {error}".splitlines()[0])
 

@@ -21,13 +21,14 @@ Small trials on purpose: 50 evaluations of a function that costs microseconds, s
 shows. Memory: resident, of the command itself without its workers. Trials: seconds by the clock, without start and
 table, which the same command takes on the finished store. Searches: their processor time in sum. Overhead: what a trial
 costs beside its search, of one core: its key, its way to a worker and back, the store."""
+_UNKNOWN = ("until all are there, s", "a batch through Dask, ms", "memory, MB", "open files")  # where something broke
 _CLUSTER_READING = """\
 Simulated: workers of `distributed` in one process with the scheduler and the command, each with its own connections
-by TCP and its heartbeat. Not simulated: processors of their own, a network, Slurm. Batches are one trial of 50
-evaluations, two a worker; a real batch has 20,000 evaluations, 400 such trials. *Dispatch*: what the command itself
-does for a batch, with twice as many batches under way as there are workers. *Through Dask*: the whole way of a
-batch, the trial included, on the one core that all workers share here: an upper bound of what scheduler and messages
-take. *Memory*, *open files*: of scheduler and all workers together, both ends of each connection."""
+by TCP and its heartbeat. Not simulated: processors of their own, a network, Slurm. Batches are 400, of one trial of
+50 evaluations each; a real batch has 20,000 evaluations, 400 such trials. *Dispatch*: what the command itself does
+for a batch, with twice as many batches under way as there are workers. *Through Dask*: the whole way of a batch, the
+trial included, on the one core that all workers share here: an upper bound of what scheduler and messages take.
+*Memory*, *open files*: of scheduler and all workers together, both ends of each connection."""
 _KILLS_READING = """\
 SIGKILL when a random share of the trials is kept, to the command (the driver, which is then started again) or to one
 of its two workers (which the command replaces). Lost: trials that were in the store when the kill was over and at the
@@ -58,7 +59,13 @@ def cluster_page(clusters: "Sequence[SimulatedCluster]") -> str:
         "open files": lambda each: f"{each.files:,}",
         "what broke": lambda each: each.failure or "nothing",
     }
-    table = markdown_table(headings, [[name, *map(show, clusters)] for name, show in rows.items()])
+    table = markdown_table(
+        headings,
+        [
+            [name, *("-" if each.failure and name in _UNKNOWN else show(each) for each in clusters)]
+            for name, show in rows.items()
+        ],
+    )
     return markdown_page("A cluster, simulated", _machine_text(), _CLUSTER_READING, table)
 
 
