@@ -2,14 +2,15 @@
 
 import time
 from collections.abc import Iterator
+from concurrent.futures import CancelledError, Future
 from concurrent.futures import Executor as Pool
-from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from distributed import Client, KilledWorker, LocalCluster
+from distributed.comm import CommClosedError
 
 from armlab.common.errors import InputError
 from bench.executors.contract import BatchExecutor, Work, WorkReport, run_in_worker
@@ -50,12 +51,18 @@ class DaskExecutor:
 def dask_executor(address: str | None, workers: int, timeout_s: float | None) -> Iterator[BatchExecutor]:
     """A running cluster, or a cluster on this machine for the time of the run.
 
-    Raises InputError if no cluster answers, or if its workers have several threads.
+    Raises InputError if no cluster answers or its scheduler is lost, or if its workers have several threads.
     """
     with _connect_client(address, workers) as client:
         _count_workers(client, address)
-        with client.get_executor(pure=False) as pool:
-            yield DaskExecutor(client, pool, address, timeout_s)
+        try:
+            with client.get_executor(pure=False) as pool:
+                yield DaskExecutor(client, pool, address, timeout_s)
+        except (CancelledError, CommClosedError):
+            raise InputError(
+                f"the Dask scheduler at {address or 'this machine'} was lost: start it and the same command again; "
+                "what is finished stays"
+            ) from None
 
 
 def _count_workers(client: Any, address: str | None) -> int:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
 from contextlib import ExitStack, closing, contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,6 +15,8 @@ from typing import Any
 
 import pytest
 from stored_trials import kept as stored
+
+from armlab.common.errors import InputError
 
 ROOT = Path(__file__).parents[2]
 TRIALS = 24
@@ -182,3 +185,10 @@ def _is_quiet(site: Path) -> bool:
     before = _started(site)
     time.sleep(3.0)
     return _started(site) == before
+
+
+def test_a_scheduler_that_is_lost_ends_the_run_in_one_line() -> None:
+    dask_executor = pytest.importorskip("bench.executors.dask_cluster", exc_type=ImportError).dask_executor
+    lost = pytest.raises(InputError, match="the Dask scheduler at this machine was lost: start it")
+    with lost, dask_executor(None, 1, None):
+        raise CancelledError  # of each future, once the client has no connection any more
