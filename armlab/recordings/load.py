@@ -139,6 +139,6 @@ def with_runs(recording: Recording, runs: Sequence[Run]) -> Recording:
         text = f"runs have different rates ({listed}); each is filtered at its own rate"
         findings.append(Finding("different_rates", "note", text))
     if not any(run.role == "validate" for run in runs):
-        text = "no run has the role validate: blocks of time are held out of the runs that identify"
+        text = "no run has the role validate: a diagnosis holds out blocks of time of the runs that identify"
         findings.append(Finding("no_validation", "note", text))
     return replace(recording, runs=tuple(runs), findings=tuple(findings))

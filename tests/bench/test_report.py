@@ -151,7 +151,15 @@ def test_runs_too_few_for_a_test_over_all_problems_leave_what_each_problem_says(
     trials = pd.DataFrame({"repetition": range(6), "value": np.arange(1.0, 7.0), "violation": 0.0, "seconds": 1.0})
     one = pd.concat([trials.assign(algorithm="a"), trials.assign(algorithm="b", value=trials["value"] + 10)])
     cells = [
-        Cell(f"p{k}", one.assign(problem=f"p{k}", swarm_size=5, budget=50), np.zeros(1), np.zeros(1), {"a": 0, "b": 0})
+        Cell(
+            f"p{k}",
+            one.assign(problem=f"p{k}", swarm_size=5, budget=50),
+            np.zeros(1),
+            np.zeros(1),
+            {"a": 0, "b": 0},
+            (),
+            (),
+        )
         for k in range(6)
     ]
     within = paired_ranking([cell.losses for cell in cells])

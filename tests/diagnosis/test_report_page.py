@@ -40,7 +40,7 @@ from armlab.report.torque.gallery import draw_gallery
 from armlab.report.torque.measured import body_sentences, joint_table
 from armlab.report.torque.residuals import correlation_seconds, filter_correlation_seconds, select_residuals
 from armlab.report.torque.torque_pictures import evidence_variable
-from armlab.report.torque.verdict import first_screen, verdict_lines
+from armlab.report.torque.torque_verdict import first_screen, verdict_lines
 from armlab.report.torque.write import report_texts, write_report
 from armlab.report.verdict_files import verdict_texts
 from armlab.report.words import effect_in_words, format_gap, format_measured, format_share, shorten_name

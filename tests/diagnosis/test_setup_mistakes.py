@@ -9,7 +9,7 @@ from small_recordings import ARM, POSITION, frame, recording_in
 from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.proof.blind.setup.mistakes import Injected, inject
 from armlab.recordings.load import load_recording
-from armlab.report.torque.verdict import verdict_sentences
+from armlab.report.torque.torque_verdict import verdict_sentences
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 

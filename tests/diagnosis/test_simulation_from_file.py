@@ -18,7 +18,7 @@ from armlab.identification.model_file import model_content
 from armlab.identification.nominal import nominal_model
 from armlab.recordings.load import load_recording
 from armlab.report.torque.content import parameter_table
-from armlab.report.torque.verdict import verdict_lines
+from armlab.report.torque.torque_verdict import verdict_lines
 from armlab.report.verdict_files import make_verdict
 from problem.drive_torque import drive_torque
 from problem.motion import Motion

@@ -284,7 +284,7 @@ def test_an_algorithm_that_writes_into_what_it_is_told_changes_no_result() -> No
     assert best(Scribbler) == best(RandomSearch) > 0
 
 
-@pytest.mark.parametrize("command", [["conceal"], ["proof", "run"], ["proof", "coverage"]])
+@pytest.mark.parametrize("command", [["conceal"], ["proof", "run"], ["proof", "ablate"]])
 def test_no_processes_are_refused(command: list[str], tmp_path: Path) -> None:
     result = CliRunner().invoke(main, [*command, "--jobs", "0"])
     assert result.exit_code == 2

@@ -10,7 +10,7 @@ import click
 import pytest
 from click.testing import CliRunner
 from servo_arms import write_recording
-from told_recordings import frame, recording_in
+from small_recordings import frame, recording_in
 
 from armlab.cli import progress as shown
 from armlab.cli.commands import CommandTable

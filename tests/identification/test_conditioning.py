@@ -44,7 +44,7 @@ def recording() -> Recording:
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(correlation, "PERMUTATIONS", 99)
     monkeypatch.setattr(conditioning_arm, "WINDOW_BLOCKS", (10, 11))
-    for module in ("answer", "page", "figure"):
+    for module in ("answer", "conditioning_page", "conditioning_figure"):
         monkeypatch.setattr(f"armlab.proof.open.conditioning.{module}.WINDOW_BLOCKS", (10, 11))
 
 
@@ -180,7 +180,7 @@ def test_the_study_writes_page_tables_and_picture_and_logs_its_look(
 ) -> None:
     monkeypatch.setattr(study, "open_public_recording", lambda name, folder: recording)
     lines = list(study.study_conditioning(tmp_path, tmp_path, ["emps"], lambda message: None))
-    assert lines[0].startswith("**RunWindows of 10 of 12 blocks: ")
+    assert lines[0].startswith("**Windows of 10 of 12 blocks: ")
     written = {path.name for path in tmp_path.iterdir()}
     assert written >= {PAGE_NAME, TABLE_NAME, CHOICES_NAME, "conditioning.png"}
     table = pd.read_csv(tmp_path / TABLE_NAME)

@@ -14,6 +14,7 @@ from problem.gradient import motion_of
 from problem.registry import parse_problem
 from problem.safe_motion import SafeConstraints
 from problem.smooth import LimitRows, smooth_criterion
+from problem.spectrum import Spectrum
 
 TINY = {"preset": "joint-fourier", "joints": 2, "harmonics": 2, "samples": 30}
 NOTHING = np.zeros(0, dtype=np.intp)
@@ -45,7 +46,7 @@ def test_a_sharp_criterion_is_the_criterion_itself_and_its_slopes_are_those_of_d
     criterion: Criterion,
 ) -> None:
     values = np.array([4.0, 2.0, 1.0])
-    plain = criterion.value(values[None])[0]
+    plain = criterion.value(Spectrum.of(values[None]))[0]
     sharp = smooth_criterion(criterion, 1e5)(values)[0]
     assert (np.exp(sharp) if criterion.kind == "eq44" else sharp) == pytest.approx(plain, rel=1e-4)
     function, step = smooth_criterion(criterion, 5.0), 1e-6

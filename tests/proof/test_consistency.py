@@ -19,7 +19,7 @@ from armlab.proof.open.real_folders.consistency import contradictions
 from armlab.recordings.load import load_recording
 from armlab.recordings.public import LOCAL_COPIES_VARIABLE, local_copies
 from armlab.recordings.recording import Recording
-from armlab.report.torque.verdict import verdict_lines
+from armlab.report.torque.torque_verdict import verdict_lines
 from armlab.report.verdict_files import make_verdict
 
 SMALL = ("friction-damper/tension-20-lb", "dfki-double-pendulum")  # recordings that are diagnosed in seconds

@@ -163,7 +163,7 @@ PICTURES = {
     ),
     "proof": Picture(
         "Something known is concealed in real recordings: what the diagnosis makes of it, by size.",
-        "results/real/concealed.svg",
+        "results/proof/real/strength.svg",
     ),
     "running": Picture("The figure that a run draws: convergence of each algorithm.", "docs/pictures/convergence.svg"),
     "which-optimiser": Picture("Problems of the suites by their properties.", "results/landscape/landscape.svg"),

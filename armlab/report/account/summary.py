@@ -132,7 +132,8 @@ class _Writer:
         """Of one joint at both speeds, of several the least and the most at their higher speeds; also behind play."""
         arm = self.diagnosis.simulation.arm
         joints = {each.claim.joint for each in self.account.findings_of(cause) if each.is_friction}
-        rows = sorted((each for each in self.account.friction if each.joint in joints), key=lambda each: each.torque[1])
+        own = (each for each in self.account.friction if each.joint in joints and each.torque[1] > 0)
+        rows = sorted(own, key=lambda each: each.torque[1])  # what is no friction by its sign is not known
         if not rows:
             return
         low, high = rows[0], rows[-1]

@@ -61,7 +61,7 @@ from armlab.recordings.identifiable import require_identifiable, require_possibl
 from armlab.recordings.load import load_recording
 from armlab.report.account.summary import MAX_WORDS
 from armlab.report.torque.content import origin_of
-from armlab.report.torque.verdict import LINE_WIDTH
+from armlab.report.torque.torque_verdict import LINE_WIDTH
 from armlab.report.verdict_files import check_output_folder
 from armlab.report.words import (
     MAX_LENGTH_IN_MM,

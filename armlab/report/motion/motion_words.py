@@ -13,7 +13,7 @@ from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 from armlab.report.account.summary import MAX_FIRST_WORDS, MAX_WORDS
 from armlab.report.motion.stated_numbers import StatedNumber, stated_causes, stated_numbers
-from armlab.report.torque.verdict import LINE_WIDTH
+from armlab.report.torque.torque_verdict import LINE_WIDTH
 from armlab.report.words import LESS_MASS, SOMETHING_UNKNOWN, format_chance
 from problem.arm import Arm
 from problem.joint_words import joint_in_words, joints_in_words

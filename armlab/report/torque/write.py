@@ -23,7 +23,7 @@ from armlab.report.torque import content, measured
 from armlab.report.torque.gallery import Gallery, draw_gallery
 from armlab.report.torque.naming_files import WeighedOutcome, names_texts, parse_place, steps_texts, why_lines
 from armlab.report.torque.residuals import select_residuals
-from armlab.report.torque.verdict import first_screen, verdict_lines
+from armlab.report.torque.torque_verdict import first_screen, verdict_lines
 from armlab.report.verdict_files import (
     PREDICTED_FOLDER,
     check_output_folder,

@@ -25,7 +25,7 @@ from problem.motion import Motion
 GramMatrices = Callable[[Motion], Array]
 """A motion (trajectories, samples, joints) to its Gram matrices (trajectories, chosen, chosen)."""
 
-COMPILER_OPTIONS = ("-O3", "-march=native", "-ffast-math", "-shared", "-fPIC", "-Wno-psabi")
+COMPILER_OPTIONS = ("-O3", "-march=native", "-ffast-math", "-fPIC", "-Wno-psabi")
 _LANES = 4
 _PROGRAM = """
 #include <math.h>
@@ -99,8 +99,11 @@ def compile_gram_matrices(arm: Arm, columns: NDArray[np.intp], folder: Path) -> 
     compiler = cpp_compiler()
     assert compiler is not None
     source, library = folder / "four_lanes.cpp", folder / "four_lanes.so"
+    compiled = folder / "four_lanes.o"
     source.write_text(_program(regressor_function(arm, columns), len(arm), columns))
-    subprocess.run([compiler, *COMPILER_OPTIONS, str(source), "-o", str(library), "-lm"], check=True)
+    subprocess.run([compiler, *COMPILER_OPTIONS, "-c", str(source), "-o", str(compiled)], check=True)
+    # linked without -ffast-math, which would make the whole process flush subnormal numbers to zero
+    subprocess.run([compiler, "-shared", str(compiled), "-o", str(library), "-lm"], check=True)
     ffi = cffi.FFI()
     ffi.cdef("void gram_matrices(long long, long long, const double *, const double *, const double *, double *);")
     run, chosen = ffi.dlopen(str(library)).gram_matrices, len(columns)

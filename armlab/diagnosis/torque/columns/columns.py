@@ -156,6 +156,9 @@ class Moments:
         return np.asarray(np.maximum(np.array(out, dtype=np.float64), 0))
 
 
+SHORTEST_COLUMN = 1e-100  # of squares that can be divided by; a shorter column is none
+
+
 def compute_moments(columns: Columns, noise: Noise, observed: Observed) -> Moments:
     """Whitens all columns and multiplies them."""
     gram = np.zeros((columns.size + 1, columns.size + 1))
@@ -166,7 +169,7 @@ def compute_moments(columns: Columns, noise: Noise, observed: Observed) -> Momen
         heldout.append(_gram(noise.white(matrix, joint, observed, "validate"))[0])
         rows.append(identify[1])
     lengths = np.sqrt(np.diag(gram)[:-1])
-    scale = np.append(np.where(lengths > 0, lengths, 1.0), 1.0)
+    scale = np.append(np.where(lengths > SHORTEST_COLUMN, lengths, 1.0), 1.0)
     gram /= np.outer(scale, scale)
     scaled = tuple(each / np.outer(scale[own], scale[own]) for each, own in zip(heldout, columns.index, strict=True))
     return Moments(gram, scale[:-1], scaled, columns.index, tuple(rows))

@@ -17,7 +17,7 @@ from armlab.proof.open.real_arms.direct_reading import MIDDLE
 from armlab.proof.open.real_arms.one_arm import AloneStudy, ArmStudy, ModelLine, ModelName
 from armlab.proof.open.real_identification.identify_recording import describe_study
 from armlab.proof.open.real_identification.looks import LOOKS_FILE
-from armlab.report.torque.verdict import verdict_sentences
+from armlab.report.torque.torque_verdict import verdict_sentences
 from armlab.report.words import (
     effect_in_words,
     finding_in_words,
