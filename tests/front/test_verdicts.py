@@ -11,7 +11,6 @@ from refusals import refusal
 import armlab
 from armlab.diagnosis.formats import FindingEntry, ParameterEntry, VerdictFile
 from armlab.recordings.recording import Recording
-from armlab.report.verdict_files import write_verdict
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 
@@ -37,20 +36,29 @@ def swing(arm, seed):
 
 
 @pytest.fixture(scope="module")
-def live(tmp_path_factory):
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("verdict")
+
+
+@pytest.fixture(scope="module")
+def live(folder, tmp_path_factory):
     robot = tmp_path_factory.mktemp("robot") / "pendulum.yaml"
     robot.write_text(ROBOT)
     arm = armlab.read_robot(str(robot))
     options = {"position": "q_rad", "torque": "tau_Nm", "units": {"position": "rad", "torque": "N.m"}}
     swings = Recording.from_dataframe(swing(arm, 1), robot, validate=swing(arm, 2), **options)
-    return armlab.diagnose(swings, as_read=True)
+    return armlab.diagnose(swings, as_read=True, out=folder)
 
 
 @pytest.fixture(scope="module")
-def stored(live, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("verdict")
-    write_verdict(live.diagnosis, folder)
+def stored(live, folder):
     return armlab.read_verdict(folder)
+
+
+def test_a_folder_that_is_given_has_the_files_of_the_command(live, folder):
+    assert {"verdict.json", "model.yaml", "report.html", "names.json", "steps.json"} <= {
+        each.name for each in folder.iterdir()
+    }
 
 
 def test_every_key_of_a_verdict_file_is_an_attribute():

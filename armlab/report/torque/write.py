@@ -92,6 +92,17 @@ def write_report(diagnosis: Diagnosis, folder: Path, command: str = "") -> Path:
     return folder / REPORT_PAGE
 
 
+def folder_texts(diagnosis: Diagnosis, out: Path, settings: Settings, command: str = "") -> dict[str, str | bytes]:
+    """The files of a diagnosis for a folder, by name. command: that makes them, as the page says it."""
+    return {
+        **verdict_texts(diagnosis, out),
+        **report_texts(diagnosis, command),
+        **names_texts(WeighedOutcome.of_diagnosis(diagnosis), settings),
+        **steps_texts(diagnosis),
+        **predicted_texts(diagnosis),
+    }
+
+
 def diagnose_recording(
     folder: Path,
     out: Path,
@@ -139,13 +150,7 @@ def diagnose_recording(
     options += ["--as-read"] * as_read + ["--only-setup"] * only_setup + ["--mcap"] * with_signals
     options += [word for form in dict.fromkeys(tables) for word in ("--table", form)]
     command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out), *options])
-    pages = verdict_texts(diagnosis, out) | report_texts(diagnosis, command)
-    texts: dict[str, str | bytes] = {
-        **pages,
-        **names_texts(WeighedOutcome.of_diagnosis(diagnosis), settings),
-        **steps_texts(diagnosis),
-        **predicted_texts(diagnosis),
-    }
+    texts = folder_texts(diagnosis, out, settings, command)
     if diagnosis.claims:
         texts |= table_files("joints", measured.joint_table(diagnosis), tables)
     moved = None
