@@ -33,11 +33,14 @@ MISSING_PACKAGE = "install"
 
 @dataclass(frozen=True)
 class Refusal:
-    """write: the files, in a folder. says: in the line. options: beside the usual ones."""
+    """write: the files, in a folder. says: in the line. options: beside the usual ones. lab: text of a Python file of
+    Isaac Lab that is given as the controller.
+    """
 
     write: Callable[[Path], list[Path]]
     says: str
     options: dict[str, Any] = field(default_factory=dict)
+    lab: str | None = None
 
 
 def table(name: str = "log.csv", change: Callable[[pd.DataFrame], pd.DataFrame] = lambda each: each) -> Any:
@@ -140,6 +143,7 @@ def small_mat(folder: Path) -> list[Path]:
 AXES = {"q1": "position_pan", "q2": "position_lift", "q3": "position_elbow"}
 OTHER = {"q1": "position_joint1", "q2": "position_joint2", "q3": "position_joint3"}
 GOOD, SHORT = frame(seconds=2.0), frame(1, 2.0)
+MOTION = {"reference_position": "tau1,tau2,tau3", "units": ("position=rad", "reference_position=rad")}
 REFUSALS = (
     Refusal(table(), "no column 'q9' for position", {"position": "q9,q2,q3"}),
     Refusal(table(), "names column q1 twice", {"position": "q1,q1,q3"}),
@@ -165,12 +169,7 @@ REFUSALS = (
     Refusal(
         table(),
         "--motor-side torque needs columns of torque",
-        {
-            "gear_ratio": "1,2,3",
-            "motor_side": "torque",
-            "reference_position": "tau1,tau2,tau3",
-            "units": ("position=rad", "reference_position=rad"),
-        },
+        {"gear_ratio": "1,2,3", "motor_side": "torque", **MOTION},
     ),
     Refusal(table("log.csv", lambda each: each.assign(q1=each["q1"] + 1e6)), "no unit makes that possible"),
     Refusal(content("log.csv.gz", b"no"), "cannot unpack"),
@@ -254,14 +253,27 @@ REFUSALS = (
     ),
     Refusal(table("log.csv", lambda each: coarse(in_turn(each).drop(range(90, 140)), 70.0)), "rows come unevenly"),
     Refusal(table("log.csv", lambda _: coarse(in_turn(log()), 100.0)), "torques fit the motion better half a step"),
+    Refusal(table(), "--controller belongs to a log of commands and positions", {"controller": "kp=1"}),
+    Refusal(table(), "--controller stiff=1: should be KEY=VALUES", {**MOTION, "controller": "stiff=1"}),
+    Refusal(table(), "kp=1,2: should hold one number, or 3, one a joint, not 2", {**MOTION, "controller": "kp=1,2"}),
+    Refusal(table(), "kp=x: 'x' is no number; none where one is unknown", {**MOTION, "controller": "kp=x"}),
+    Refusal(table(), "has no actuators of Isaac Lab", MOTION, "stiffness = 1.0\n"),
+    Refusal(table(), "has no actuators for joint", MOTION, "IdealPDActuatorCfg(joint_names_expr=['other'])"),
+    Refusal(table(), "of DCMotorCfg of joint", MOTION, "DCMotorCfg(joint_names_expr=['.*'])"),
+    Refusal(table(), "lab.py as Python", MOTION, "class ("),
+    Refusal(table(), "DCMotorCfg has no joint_names_expr", MOTION, "DCMotorCfg(stiffness=1.0)"),
+    Refusal(table(), "line 1: stiffness should be written out as numbers", MOTION, "DCMotorCfg(stiffness=STIFF)"),
 )
 
 
 def refuse(case: Refusal, folder: Path) -> InputError:
     """The refusal of an input; it has to be one line, and nothing may be written."""
-    files = case.write(folder)
+    files, options = case.write(folder), {**OPTIONS, **case.options}
+    if case.lab is not None:
+        (folder / "lab.py").write_text(case.lab)
+        options["controller"] = str(folder / "lab.py")
     with pytest.raises(InputError) as raised:
-        import_files(files, folder / "recording", {**OPTIONS, **case.options})
+        import_files(files, folder / "recording", options)
     assert not (folder / "recording").exists()
     return raised.value
 
