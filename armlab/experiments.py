@@ -160,6 +160,8 @@ def _configuration(given: str | Path | Mapping[str, Any] | None, keys: dict[str,
             "lower=[...] and upper=[...]"
         )
     box = {name: keys.pop(name) for name in ("lower", "upper") if name in keys}
+    if callable(keys.get("problem")) and len(box) < 2:
+        raise InputError("problem is a function: give lower= and upper=, the ends of its box, a number a dimension")
     if box or callable(keys.get("problem")):
         keys["problem"] = {"preset": keys.get("problem"), **box}
     budget = {} if {"iterations", "evaluations"} & keys.keys() else {"evaluations": EVALUATIONS}

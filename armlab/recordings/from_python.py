@@ -3,7 +3,7 @@
 import atexit
 import re
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -140,6 +140,9 @@ def _split_frames(frame: Any, validate: Any) -> tuple[dict[str, "pd.DataFrame"],
         raise InputError(
             "validate should be a DataFrame, a list or a dictionary of them, or, for one frame, one True or False a row"
         )
+    if marks.all() or not marks.any():
+        found, right = ("every row", "leave rows to identify from") if marks.any() else ("no row", "or leave it out")
+        raise InputError(f"validate holds {found} of the frame: mark those that take no part in any fit, {right}")
     starts = [0, *(np.flatnonzero(np.diff(marks)) + 1).tolist(), len(marks)]
     parts = [(bool(marks[first]), frame.iloc[first:last]) for first, last in pairwise(starts)]
     shortest = min(len(part) for _, part in parts)
@@ -155,14 +158,21 @@ def _split_frames(frame: Any, validate: Any) -> tuple[dict[str, "pd.DataFrame"],
 def _named_frames(frames: Any, stem: str) -> dict[str, "pd.DataFrame"]:
     import pandas as pd
 
-    if isinstance(frames, pd.DataFrame):
+    if isinstance(frames, str | pd.DataFrame | pd.Series | np.ndarray) or not isinstance(frames, Iterable):
         frames = [frames]
     named = frames if isinstance(frames, Mapping) else {f"{stem}-{k}": each for k, each in enumerate(frames, 1)}
     wrong = next((each for each in named.values() if not isinstance(each, pd.DataFrame)), None)
     if wrong is not None or not named:
         found = "nothing" if wrong is None else type(wrong).__name__
-        raise InputError(f"a recording is made of DataFrames, one a run, not of {found}")
+        raise InputError(f"a recording is made of DataFrames, one a run, not of {found}{_instead_of(wrong)}")
     return {re.sub(r"[^\w.-]+", "_", str(name)): each for name, each in named.items()}
+
+
+def _instead_of(wrong: object) -> str:
+    """What would be right where a path or an array was given for a frame."""
+    if isinstance(wrong, str | Path):
+        return ": armlab.import_recording takes the path of a log"
+    return ": give pd.DataFrame(x, columns=[...])" if isinstance(wrong, np.ndarray) else ""
 
 
 def _with_index(frame: "pd.DataFrame") -> "pd.DataFrame":
@@ -177,9 +187,14 @@ def _with_index(frame: "pd.DataFrame") -> "pd.DataFrame":
 def _paths(given: Any) -> list[Path]:
     if isinstance(given, str | Path):
         return [Path(given)]
-    if not isinstance(given, Sequence) or not all(isinstance(each, str | Path) for each in given):
-        raise InputError(f"files and validate should be paths of logs, not {given!r:.60}")
-    return [Path(each) for each in given]
+    entries = given if isinstance(given, Sequence) else [given]
+    wrong = next((each for each in entries if not isinstance(each, str | Path)), None)
+    if wrong is not None:
+        raise InputError(
+            f"files and validate should be paths of logs, not {type(wrong).__name__}: armlab.Recording.from_dataframe "
+            "takes DataFrames"
+        )
+    return [Path(each) for each in entries]
 
 
 def _import(

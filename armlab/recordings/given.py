@@ -1,5 +1,6 @@
 """Recordings as functions for users take them: an object, or the path of its folder."""
 
+from os import PathLike
 from pathlib import Path
 
 from armlab.common.errors import InputError
@@ -16,6 +17,11 @@ def read_recording(folder: str | Path) -> Recording | MotionRecording:
     A recording of motion only, without torque, is a `MotionRecording`. Raises InputError, in one line, for what is
     missing, wrong, or not safe to repair.
     """
+    if not isinstance(folder, str | PathLike):
+        raise InputError(
+            f"read_recording takes the path of a recording's folder, not {type(folder).__name__}: "
+            "armlab.Recording.from_dataframe makes a recording of DataFrames"
+        )
     return load_motion_recording(folder) if is_motion_only(Path(folder)) else load_recording(folder)
 
 

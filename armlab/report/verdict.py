@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -172,6 +173,11 @@ def read_verdict(path: str | Path) -> Verdict:
         for finding in armlab.read_verdict("verdict").findings:
             print(finding.effect, finding.joint, finding.equation)
     """
+    if not isinstance(path, str | PathLike):
+        raise InputError(
+            f"read_verdict takes the path of a verdict's folder or {FILE_NAME}, not {type(path).__name__}: to diagnose "
+            "DataFrames, give what armlab.Recording.from_dataframe makes of them to armlab.diagnose"
+        )
     place = Path(path)
     file = place / FILE_NAME if place.is_dir() else place
     return verdict_of(read_verdict_file(file), None, file.parent)

@@ -69,7 +69,7 @@ def test_a_function_runs_in_several_processes_with_the_same_results():
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        ({"problem": bowl}, "missing key 'lower' in problem of the configuration"),
+        ({"problem": bowl}, "problem is a function: give lower= and upper=, the ends of its box"),
         ({"problem": bowl, "lower": [1], "upper": [0]}, "each below its partner"),
         ({"problem": bowl, "bounds": [(-5, 5)]}, "give the box of a function as lower=[...] and upper=[...]"),
         ({"problem": lambda x: x, **BOX}, "function <lambda> should return a number for a point (2,), not array"),

@@ -82,11 +82,30 @@ def test_rows_and_names_say_which_runs_validate(frames):
         ({"lock": {"joint3": 0.0}}, "lock makes a robot file of its own: give out, a new folder that keeps it"),
         ({"position": ["q1", "q,2"]}, "the name 'q,2' holds a comma"),
         ({"validate": [1, 2]}, "validate should be a DataFrame"),
+        ({"validate": np.full(1200, True)}, "validate holds every row of the frame: mark those that take no part"),
+        ({"validate": np.full(1200, False)}, "validate holds no row of the frame: mark those that take no part"),
         ({"validate": np.arange(1200) % 2 == 0}, "cuts the frame into 1200 stretches, the shortest of 1 rows"),
     ],
 )
 def test_a_mistake_is_one_line_that_names_the_keyword(frames, options, message):
     assert message in refusal(from_frames, frames[0], **options)
+
+
+@pytest.mark.parametrize(
+    ("act", "given", "message"),
+    [
+        (armlab.read_recording, frame_of, "not DataFrame: armlab.Recording.from_dataframe makes a recording"),
+        (armlab.read_verdict, frame_of, "not DataFrame: to diagnose DataFrames, give what armlab.Recording.from_"),
+        (armlab.import_recording, frame_of, "not DataFrame: armlab.Recording.from_dataframe takes DataFrames"),
+        (armlab.import_recording, lambda run: [frame_of(run)], "not DataFrame: armlab.Recording.from_dataframe takes"),
+        (from_frames, lambda _: "log.csv", "not of str: armlab.import_recording takes the path of a log"),
+        (from_frames, lambda _: [Path("log.csv")], "Path: armlab.import_recording takes the path of a log"),
+        (from_frames, lambda run: run.position, "not of ndarray: give pd.DataFrame(x, columns=[...])"),
+        (from_frames, lambda _: 42, "made of DataFrames, one a run, not of int"),
+    ],
+)
+def test_data_given_to_another_function_is_answered_by_the_name_of_the_right_one(recording, act, given, message):
+    assert message in refusal(act, given(recording.runs[0]))
 
 
 def test_what_is_no_frame_and_no_robot_is_refused(frames):
@@ -107,7 +126,7 @@ def test_a_log_is_imported_and_written_where_a_folder_is_given(frames, tmp_path,
     written = armlab.import_recording([Path("log-1.csv")], out="rec", **options)
     assert_array_equal(armlab.read_recording("rec").runs[0].torque, written.runs[0].torque)
     assert "rec is there already" in refusal(armlab.import_recording, "log-1.csv", out="rec", **options)
-    assert "should be paths of logs, not 42" in refusal(armlab.import_recording, 42, **options)
+    assert "should be paths of logs, not int" in refusal(armlab.import_recording, 42, **options)
 
 
 def test_a_model_of_frames_names_the_robot_file_that_was_given(frames, tmp_path):
