@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from distributed import Client, KilledWorker, LocalCluster
-from distributed.comm import CommClosedError
+from distributed.comm.core import CommClosedError
 
 from armlab.common.errors import InputError
 from bench.executors.contract import BatchExecutor, Work, WorkReport, run_in_worker

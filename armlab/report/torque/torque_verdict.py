@@ -103,7 +103,8 @@ def verdict_lines(diagnosis: Diagnosis, verbose: bool = False) -> Iterator[str]:
     if account.minor:
         yield f"  {count_of(len(account.minor), 'small difference')} more, in verdict.json and folded on the page"
     if diagnosis.is_plain:
-        yield "  model.yaml holds plain least squares: it predicts blocks of these runs better than the named effects"
+        yield "  model.yaml holds plain least squares: it predicts blocks of these runs better than the named effects;"
+        yield "  simulators do not take its base parameters: `armlab identify --method physical` has bodies to export"
     for number, step in enumerate(next_steps(diagnosis, account), 1):
         yield from (f"  {line}" for line in wrap(f"next {number}: {step}", LINE_WIDTH - 2))
     if verbose:
