@@ -119,7 +119,7 @@ def test_levels_in_common_are_those_of_the_robot() -> None:
 def test_friction_that_fell_is_named_with_its_percent() -> None:
     found = comparison("warm")
     assert found.status == "changed"
-    assert [(each.effect, each.joint) for each in found.named] == [("viscous_friction", 2)]
+    assert [(each.effect, each.joint) for each in found.findings] == [("viscous_friction", 2)]
     (change,) = changed(found)
     assert (change.effect, change.joint, change.parameter) == ("viscous_friction", 2, "coefficient")
     low, high = change.interval
@@ -134,14 +134,14 @@ def test_friction_that_fell_is_named_with_its_percent() -> None:
 
 
 def test_the_other_way_round_the_change_is_the_mirror_image() -> None:
-    (forward,) = comparison("warm").named
-    (back,) = compare(recording("warm", 10, LESS), recording("cold", 0)).named
+    (forward,) = comparison("warm").findings
+    (back,) = compare(recording("warm", 10, LESS), recording("cold", 0)).findings
     assert (forward.effect, forward.joint) == (back.effect, back.joint)
     assert forward.changes[0].difference == pytest.approx(-back.changes[0].difference, rel=1e-3)
 
 
 def test_a_changed_load_is_a_payload() -> None:
-    (load,) = comparison("loaded").named
+    (load,) = comparison("loaded").findings
     assert (load.effect, load.joint) == ("payload", 3)
     assert [(each.effect, each.joint) for each in load.rivals][-1] == ("inertial_parameter_error", 3)
 
@@ -173,7 +173,7 @@ def test_both_laws_of_friction_that_changed_are_one_cause_with_a_row_each() -> N
     for run in less.runs:
         drag = 0.5 * np.tanh(np.gradient(run.position[:, 1], run.time) / 0.02)
         grown.append(run.with_signals(run.time, {"torque": run.torque + np.outer(drag, [0, 1, 0])}))
-    (named,) = compare(old, replace(less, runs=tuple(grown))).named
+    (named,) = compare(old, replace(less, runs=tuple(grown))).findings
     assert named.joint == 2
     sizes = {each.effect: each.interval for each in named.changes}
     assert sizes.keys() == {"coulomb_friction", "viscous_friction"}
@@ -237,8 +237,8 @@ def test_a_damper_at_another_tension_has_other_friction_and_no_other_fault(
     names = [f"friction-damper-{each}-lb" for each in tensions]
     opened = [load_recording(fetch_recording(name, tmp_path / name)) for name in names]
     found = compare(opened[0], opened[1], baseline="refit")
-    assert found.named
-    assert {each.effect for each in found.named} <= DAMPER_LAWS
+    assert found.findings
+    assert {each.effect for each in found.findings} <= DAMPER_LAWS
     (level,) = [each for each in found.changes if each.parameter == ALL_FRICTION]
     assert level.ratio is not None
     for old, new in zip(opened[0].runs, opened[1].runs, strict=True):
@@ -263,7 +263,7 @@ def test_the_friction_that_differs_between_two_runs_is_what_constant_speed_shows
     """The force at constant speed is read without any model."""
     whole = load_recording(fetch_recording("emps", tmp_path / "emps"))
     found = compare(*(one_run(whole, run) for run in whole.runs))
-    (named,) = found.named
+    (named,) = found.findings
     changes = {each.parameter: np.array(each.interval) for each in named.changes}
     assert {"positive", "negative"} <= set(changes) <= {"level", "positive", "negative"}
     forces, speeds = [], []

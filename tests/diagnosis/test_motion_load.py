@@ -59,7 +59,7 @@ def pendulum(folder: Path, kp: float, load: float, seed: int = 0) -> MotionRecor
 def test_another_load_is_named_in_newton_metres_by_the_known_load_of_the_old_recording(tmp_path: Path) -> None:
     found = compare_load(pendulum(tmp_path / "old", 8.0, 1.0), pendulum(tmp_path / "new", 8.0, 2.2, seed=1))
     assert found is not None
-    assert [(each.effect, each.joint) for each in found.named] == [("payload", 1)]
+    assert [(each.effect, each.joint) for each in found.findings] == [("payload", 1)]
     (moment,) = (each for each in found.changes if (each.effect, each.parameter) == ("payload", "mcx"))
     assert moment.ratio is not None
     assert moment.ratio[1] < 2.2 < moment.ratio[2]

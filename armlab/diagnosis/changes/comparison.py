@@ -33,7 +33,7 @@ GEOMETRY_TOLERANCE = 1e-6  # rad (m): geometry that counts as that of the same r
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """diagnoses: of each recording alone. named: what changed, the surest first. changes: every parameter compared.
+    """diagnoses: of each recording alone. findings: what changed, the surest first. changes: every parameter compared.
 
     reason: of an inconclusive comparison. doubtful: what makes it so where the runs of one recording differ as much as
     the recordings. notes: sentences on what was not used. trends: of more than two recordings,
@@ -42,7 +42,7 @@ class Comparison:
 
     status: ComparisonStatus
     diagnoses: tuple[Diagnosis, ...]
-    named: tuple[NamedChange, ...] = ()
+    findings: tuple[NamedChange, ...] = ()
     changes: tuple[Change, ...] = ()
     reason: str = ""
     doubtful: NamedChange | None = None
@@ -77,11 +77,11 @@ class Comparison:
             lines.append(f"  perhaps {self.doubtful.effect}@{self.doubtful.joint}: {self.doubtful.equation}")
         if self.status == "inconclusive":
             return "\n".join([*lines, f"  {self.reason}"])
-        lines += [f"  {each.effect}@{each.joint}: {each.equation}" for each in self.named]
+        lines += [f"  {each.effect}@{each.joint}: {each.equation}" for each in self.findings]
         return "\n".join([*lines, f"  parameters compared: {len(self.changes)}"])
 
     def _repr_html_(self) -> str:
-        rows = [(each.effect, "" if each.joint is None else each.joint, each.equation) for each in self.named]
+        rows = [(each.effect, "" if each.joint is None else each.joint, each.equation) for each in self.findings]
         title = f"Comparison of {', '.join(self.names)}: {self.status}"
         text = self.reason or f"parameters compared: {len(self.changes)}"
         return notebook_html(title, text, ("effect", "joint", "change"), rows)

@@ -61,9 +61,9 @@ def compare_load(old: MotionRecording, new: MotionRecording) -> Comparison | Non
     found = conclude(seen, diagnoses, notes, ())
     if log_odds > settings.tuning.comparison.least_evidence:
         return found
-    if not any(each.effect == PAYLOAD_FACTS.id for each in found.named):
+    if not any(each.effect == PAYLOAD_FACTS.id for each in found.findings):
         return None
-    return replace(found, named=tuple(_beside_gain(each, log_odds) for each in found.named))
+    return replace(found, findings=tuple(_beside_gain(each, log_odds) for each in found.findings))
 
 
 @dataclass(frozen=True)

@@ -89,8 +89,8 @@ def comparison_sentences(comparison: Comparison) -> tuple[str, str]:
         return f"{names} cannot be compared.", comparison.reason
     if comparison.status == "same":
         return f"Nothing changed between {names} that the recordings show.", seen
-    phrases = [_leading_phrase(comparison, each) for each in comparison.named[:MAX_NAMED_CHANGES]]
-    rest = len(comparison.named) - len(phrases)
+    phrases = [_leading_phrase(comparison, each) for each in comparison.findings[:MAX_NAMED_CHANGES]]
+    rest = len(comparison.findings) - len(phrases)
     more = f", and {rest} more" if rest else ""
     first = f"Between {names} this changed: {join_words(phrases)}{more}."
     left = MAX_WORDS - len(f"{first} {NOTHING_ELSE}".split())
@@ -185,7 +185,7 @@ def comparison_lines(comparison: Comparison) -> Iterator[str]:
     """The verdict, then each change with its rivals and how sure it is."""
     first, second = comparison_sentences(comparison)
     yield from wrap(f"{comparison.status.upper()}: {first} {second}", LINE_WIDTH)
-    for each in comparison.named:
+    for each in comparison.findings:
         rivals = [rival_in_words(comparison.arm, rival) for rival in each.rivals]
         also = f"; it could also be {join_words(rivals)}" if rivals else ""
         text = f"{change_phrase(comparison.arm, each)}: {each.equation}, p {format_probability(each.p_value)}{also}"
@@ -218,7 +218,7 @@ def make_comparison_file(comparison: Comparison) -> ComparisonFile:
         new=comparison.names[-1],
         recordings=comparison.names,
         level=ComparisonTuning().level,
-        findings=tuple(_finding_entry(each) for each in comparison.named),
+        findings=tuple(_finding_entry(each) for each in comparison.findings),
         doubtful=None if comparison.doubtful is None else _finding_entry(comparison.doubtful),
         changes=tuple(_change_entry(each) for each in comparison.changes),
         smallest_detectable=tuple(_detectable_entry(each) for each in comparison.changes),
@@ -333,8 +333,8 @@ def comparison_page(comparison: Comparison, command: str) -> str:
         f"What changed between {join_words(comparison.names)}",
         status=kind,
         verdict=comparison_sentences(comparison),
-        changed=_named_table(comparison) if comparison.named else None,
-        cards=[_card(comparison.arm, each, comparison.names) for each in comparison.named],
+        changed=_named_table(comparison) if comparison.findings else None,
+        cards=[_card(comparison.arm, each, comparison.names) for each in comparison.findings],
         trends=_trend_part(comparison) if comparison.trends else None,
         picture=draw_changes(comparison.arm, changes) if changes else None,
         moved=_changes_table(comparison.arm, [each for each in changes if each.changed]),
@@ -347,7 +347,7 @@ def comparison_page(comparison: Comparison, command: str) -> str:
 def _named_table(comparison: Comparison) -> Table:
     """What changed, where and by how much, and what else it could be."""
     rows = []
-    for each in comparison.named:
+    for each in comparison.findings:
         amounts = "; ".join(_amount(one) for one in each.changes) or each.equation
         where = place_in_words(comparison.arm, each.effect, each.joint, each.joints)
         rivals = (

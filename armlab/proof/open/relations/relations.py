@@ -75,7 +75,7 @@ def _no_change(found: Comparison) -> tuple[bool | None, str]:
     if found.status == "inconclusive":
         return None, found.reason
     largest = max((abs(each.difference) / each.detectable for each in found.changes), default=0.0)
-    names = [f"{each.effect}@{each.joint}" for each in found.named]
+    names = [f"{each.effect}@{each.joint}" for each in found.findings]
     return not names, ", ".join(names) or f"largest difference {largest:.2g} of the smallest that is named"
 
 
@@ -144,7 +144,7 @@ def mirrored(recording: Recording, desk: Desk) -> tuple[bool | None, str]:
     there, back = desk.compare(recording, changed), desk.compare(changed, recording)
     if "inconclusive" in (there.status, back.status):
         return None, there.reason or back.reason
-    names = [[(each.effect, each.joint) for each in found.named] for found in (there, back)]
+    names = [[(each.effect, each.joint) for each in found.findings] for found in (there, back)]
     if sorted(names[0], key=str) != sorted(names[1], key=str):
         return False, f"{names[0]} there, {names[1]} back"
     apart = [
@@ -206,14 +206,14 @@ def added_law_is_found(recording: Recording, desk: Desk) -> tuple[bool | None, s
     found = desk.compare(recording, added)
     if found.status == "inconclusive":
         return None, found.reason
-    classes = [(each.effect, each.joint) for each in found.named]
-    classes += [(rival.effect, rival.joint) for each in found.named for rival in each.rivals]
+    classes = [(each.effect, each.joint) for each in found.findings]
+    classes += [(rival.effect, rival.joint) for each in found.findings for rival in each.rivals]
     friction: set[tuple[str, int | None]] = {("viscous_friction", joint + 1)}
-    friction |= {(each.effect, each.joint) for each in found.named if each.form == ONE_FACTOR}
+    friction |= {(each.effect, each.joint) for each in found.findings if each.form == ONE_FACTOR}
     taken_off = _taken_off(recording, added)
     rest = desk.compare(recording, taken_off)
-    named = ", ".join(f"{each.effect}@{each.joint}" for each in found.named) or "nothing"
-    return bool(friction & set(classes)) and not rest.named, f"viscous friction at joint {joint + 1}: {named} named"
+    named = ", ".join(f"{each.effect}@{each.joint}" for each in found.findings) or "nothing"
+    return bool(friction & set(classes)) and not rest.findings, f"viscous friction at joint {joint + 1}: {named} named"
 
 
 def _taken_off(recording: Recording, added: Recording) -> Recording:
