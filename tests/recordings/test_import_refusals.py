@@ -253,6 +253,10 @@ REFUSALS = (
     ),
     Refusal(table("log.csv", lambda each: coarse(in_turn(each).drop(range(90, 140)), 70.0)), "rows come unevenly"),
     Refusal(table("log.csv", lambda _: coarse(in_turn(log()), 100.0)), "torques fit the motion better half a step"),
+    Refusal(
+        table("log.csv", lambda each: each.assign(t=each["t"].where(each.index % 3 > 0))),
+        "134 of 400 rows hold a value that is not a measurement (line 2: t = nan)",
+    ),
     Refusal(table(), "--controller belongs to a log of commands and positions", {"controller": "kp=1"}),
     Refusal(table(), "--controller stiff=1: should be KEY=VALUES", {**MOTION, "controller": "stiff=1"}),
     Refusal(table(), "kp=1,2: should hold one number, or 3, one a joint, not 2", {**MOTION, "controller": "kp=1,2"}),

@@ -9,6 +9,7 @@ import pytest
 from gripper_robots import GRIPPER_URDF
 from joint_state_bags import write_bag
 from numpy.testing import assert_allclose, assert_array_equal
+from odd_logs import in_turn
 from recording_folders import POSITION, TORQUE, frame
 from refusals import refusal
 from scipy.io import savemat
@@ -266,6 +267,21 @@ def test_a_log_that_no_command_could_use_is_not_imported(
     assert told.startswith("nothing is written: log.csv")
     assert message in told
     assert not (tmp_path / "recording").exists()
+
+
+def test_rows_without_a_stamp_are_left_out_of_signals_in_rows_of_their_own_and_said_so(tmp_path: Path) -> None:
+    rows = in_turn(frame())
+    path = tmp_path / "log.csv"
+    rows.assign(t=rows["t"].where(np.arange(len(rows)) % 3 > 0)).to_csv(path, index=False)
+    given = {**OPTIONS, "time": "t", "position": "q*", "torque": "tau*"}
+    (source,) = plan_import([path], {**given, "out": tmp_path / "recording"}).sources.values()
+    (note,) = [each.text for each in source.table.findings]
+    assert f"; {-(-len(rows) // 3)} rows have no stamp and are left out" in note
+    import_files([path], tmp_path / "recording", given)
+    (run,) = load_recording(tmp_path / "recording").runs
+    wanted = np.searchsorted(rows["t"], run.time - 1e-9)
+    assert_array_equal(run.torque, rows[list(TORQUE)].to_numpy()[wanted])
+    assert_allclose(run.position, frame()[list(POSITION)].to_numpy()[wanted], atol=1e-3)
 
 
 def test_columns_of_another_order_than_the_positions_are_refused(tmp_path: Path) -> None:

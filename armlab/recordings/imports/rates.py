@@ -57,26 +57,27 @@ class OnStamps:
 def put_on_common_stamps(table: Table, columns: Mapping[str, Sequence[str]], time_factor: float) -> Table:
     """The table with all signals in each row, where they came in rows of their own.
 
-    columns: of all signals, time first. time_factor: s per unit of the stamps. A table whose rows are whole but for a
-    tenth stays as it is. Raises InputError where two signals never come close to each other.
+    columns: of all signals, time first. time_factor: s per unit of the stamps. A table whose rows with a stamp are
+    whole but for a tenth stays as it is. Raises InputError where two signals never come close to each other.
     """
     stamps = table.columns(columns["time"], "time")[:, 0]
     wanted = [(signal, name) for signal, names in columns.items() if signal != "time" for name in names]
-    whole = np.isfinite(stamps)
+    whole = is_stamped = np.isfinite(stamps)
     for _, name in wanted:
-        whole &= np.isfinite(table.columns([name], "import")[:, 0])
-    if whole.sum() >= (1 - MAX_LOST_SHARE) * len(whole):
+        whole = whole & np.isfinite(table.columns([name], "import")[:, 0])
+    if whole.sum() >= (1 - MAX_LOST_SHARE) * is_stamped.sum():
         return table
     values = table.columns([name for _, name in wanted], "import")
-    stamped = np.flatnonzero(np.isfinite(stamps))
+    stamped = np.flatnonzero(is_stamped)
     odd = _far_beyond(values)
     values[odd] = np.nan
     empty = find_zero_rows(list(values[stamped].T))
     others = f"; {empty.sum()} rows hold zeros alone, between rows that do not, and are left out" if empty.any() else ""
     others += f"; {odd.sum()} values are far beyond all others and left out" if odd.any() else ""
-    stamped = stamped[~empty]
-    again = duplicated_rows([stamps[stamped], values[~empty]])
-    time, values, stamped = stamps[stamped][~again], values[~empty][~again], stamped[~again]
+    others += f"; {np.sum(~is_stamped)} rows have no stamp and are left out" if not is_stamped.all() else ""
+    values, stamped = values[stamped][~empty], stamped[~empty]
+    again = duplicated_rows([stamps[stamped], values])
+    time, values, stamped = stamps[stamped][~again], values[~again], stamped[~again]
     if np.sum(np.diff(time) < 0) > MAX_LOST_SHARE * len(time):
         raise InputError(
             f"{table.file}: signals stand in rows of their own, and the rows in no order of time: sort them by their "
