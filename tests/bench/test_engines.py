@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, nullcontext
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -187,8 +187,19 @@ def _is_quiet(site: Path) -> bool:
     return _started(site) == before
 
 
-def test_a_scheduler_that_is_lost_ends_the_run_in_one_line() -> None:
-    dask_executor = pytest.importorskip("bench.executors.dask_cluster", exc_type=ImportError).dask_executor
-    lost = pytest.raises(InputError, match="the Dask scheduler at this machine was lost: start it")
-    with lost, dask_executor(None, 1, None):
+class _Client:
+    """A client of a cluster with one worker."""
+
+    def nthreads(self) -> dict[str, int]:
+        return {"tcp://worker": 1}
+
+    def get_executor(self, pure: bool) -> Any:
+        return nullcontext()
+
+
+def test_a_scheduler_that_is_lost_ends_the_run_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = pytest.importorskip("bench.executors.dask_cluster", exc_type=ImportError)
+    monkeypatch.setattr(module, "_connect_client", lambda address, workers: nullcontext(_Client()))
+    lost = pytest.raises(InputError, match="the Dask scheduler at tcp://here was lost: start it")
+    with lost, module.dask_executor("tcp://here", 1, None):
         raise CancelledError  # of each future, once the client has no connection any more
