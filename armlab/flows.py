@@ -1,23 +1,20 @@
 """Identification and prediction as functions for scripts and notebooks."""
 
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 
 from armlab.common.arrays import Array
-from armlab.common.errors import DataError, InputError
+from armlab.common.errors import InputError
 from armlab.common.notebook import notebook_html
 from armlab.common.settings import suggest_name
 from armlab.effects.contract import Candidate
-from armlab.identification.identifier import METHODS, USUAL_METHOD, Identifier
-from armlab.identification.identifier_choice import choose_identifier
-from armlab.identification.identify import robot_path, wrong_reading
+from armlab.identification.identifier import METHODS
+from armlab.identification.identify import IdentifyOptions, fit_identifier, wrong_reading
 from armlab.identification.model import Model
 from armlab.identification.torque_model import TorqueModel
 from armlab.identification.validation import RunError, format_percent, run_error
-from armlab.recordings.cutoff_trial import choose_cutoff_hz
 from armlab.recordings.given import GivenRecording, torque_recording_of
-from armlab.recordings.identifiable import require_identifiable, require_possible, require_torque
+from armlab.recordings.identifiable import require_identifiable, require_torque
 from armlab.recordings.recording import Recording
 
 SHOWN = 4  # runs in a repr; the others are counted
@@ -36,8 +33,8 @@ def identify(
     recording: or the path of its folder. method: an estimator of `armlab identify --method`; the one that predicts
     best if left out. components: viscous and Coulomb friction, rotor inertia and offset at each joint if left out; with
     others the method is `weighted` if left out. cutoff_hz: of the low-pass, the one that predicts best if left out.
-    as_read: the recording and the robot file are not doubted. Raises InputError where no run
-    identifies, where the runs do not fit the arm, or where the recording is read wrongly.
+    as_read: the recording and the robot file are not doubted. Raises InputError where no run identifies, where the runs
+    do not fit the arm, or where the recording is read wrongly.
 
         model = armlab.identify("my-recording")
         model.save("model.yaml")
@@ -46,23 +43,11 @@ def identify(
         raise InputError(f"unknown method {method!r}: {suggest_name(method, list(METHODS))}")
     recording = torque_recording_of(recording)
     require_identifiable(recording)
-    runs = recording.runs_to_identify()
     wrong = None if as_read else wrong_reading(recording)
     if wrong is not None:
         raise InputError(f"{recording.name}: {wrong.sentence} `as_read=True` identifies it all the same")
-    require_possible(recording)
-    arm, robot = recording.arm, robot_path(recording)
-    try:
-        cutoff = cutoff_hz or choose_cutoff_hz(arm, runs)
-        if method is None and components is None:
-            identifier = choose_identifier(arm, runs, cutoff, robot)
-        else:
-            identifier = Identifier(arm, components, method or USUAL_METHOD, cutoff_hz=cutoff, robot=robot)
-        model = identifier.fit(runs).model_
-    except DataError as error:
-        raise InputError(f"{recording.name}: {error}") from None
-    model.provenance.update(recording=recording.name, runs=[run.name for run in runs], version=version("armlab"))
-    return model
+    identifier, _ = fit_identifier(recording, IdentifyOptions(method, cutoff_hz, components=components))
+    return identifier.model_
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,11 @@ DECIDING = tuple(DIAGNOSIS / "torque" / each for each in ("evidence", "names")) 
 
 @dataclass(frozen=True)
 class TuningCounts:
-    """numbers: for tuning. deciding: those that the code of `DECIDING` reads. by_eye: so chosen. constants: named."""
+    """How many there are of each kind.
+
+    numbers: tuning numbers. deciding: those of them that the code of `DECIDING` reads. by_eye: those whose source is
+    that somebody chose them by eye. constants: see `count_constants`.
+    """
 
     numbers: int
     deciding: int

@@ -14,6 +14,7 @@ from armlab.common.files import write_texts
 from armlab.common.report.page import Table, png_address, render_page
 from armlab.common.report.palette import figure_style
 from armlab.common.report.wording import format_number, format_unit
+from armlab.effects.contract import Candidate
 from armlab.identification.identifier import USUAL_METHOD, Identifier
 from armlab.identification.identifier_choice import choose_identifier
 from armlab.identification.model import Model
@@ -148,7 +149,7 @@ class IdentifyOptions:
     """method: one of METHODS, chosen if left out. tolerance: of a prior about the robot's own links. choose: by
     cross-validation.
 
-    as_read: the recording and the robot file are not doubted.
+    as_read: the recording and the robot file are not doubted. components: other ones than the usual.
     """
 
     method: str | None = None
@@ -156,6 +157,28 @@ class IdentifyOptions:
     tolerance: float | None = None
     choose: bool = False
     as_read: bool = False
+    components: tuple[Candidate, ...] | None = None
+
+
+def fit_identifier(
+    recording: Recording, options: IdentifyOptions, progress: Callable[[str], None] = lambda message: None
+) -> tuple[Identifier, list[str]]:
+    """The fitted identifier of a recording that is read rightly, and lines that say what was chosen.
+
+    Raises InputError, in one line, for a recording that cannot be used.
+    """
+    require_possible(recording)
+    runs = recording.runs_to_identify()
+    progress("choosing cut-off and components" if options.choose else "choosing the cut-off")
+    try:
+        identifier, how = _build_identifier(recording, options)
+        progress("fitting")
+        identifier.fit(runs)
+    except DataError as error:
+        raise InputError(f"{recording.folder}: {error}") from None
+    facts = {"recording": recording.name, "runs": [run.name for run in runs], "version": version("armlab")}
+    identifier.model_.provenance.update(facts)
+    return identifier, how
 
 
 def identify_recording(
@@ -171,22 +194,13 @@ def identify_recording(
     progress("reading the recording")
     recording = load_recording(folder)
     require_identifiable(recording)
-    runs = recording.runs_to_identify()
     if options.tolerance and recording.arm.links is None:
         raise InputError(f"--tolerance needs nominal `links`, and the robot {recording.arm.name} has none")
     if not options.as_read:
         progress("asking how it is to be read")
         _refuse_wrong_reading(recording, out)
-    require_possible(recording)
-    progress("choosing cut-off and components" if options.choose else "choosing the cut-off")
-    try:
-        identifier, how = _build_identifier(recording, options)
-        progress("fitting")
-        identifier.fit(runs)
-    except DataError as error:
-        raise InputError(f"{folder}: {error}") from None
+    identifier, how = fit_identifier(recording, options, progress)
     model = identifier.model_
-    model.provenance.update(recording=recording.name, runs=[run.name for run in runs], version=version("armlab"))
     errors = tuple(run_error(model, model.signals(run)) for run in recording.runs)
     yield from how
     yield from parameter_lines(model)
@@ -241,8 +255,8 @@ def _build_identifier(recording: Recording, options: IdentifyOptions) -> tuple[I
         if cutoff is None:
             cutoff = choose_cutoff_hz(arm, recording.runs_to_identify())
             how = [f"cut-off: {cutoff:.4g} Hz, which predicts best on blocks of the runs that identify"]
-        if options.method is not None or options.tolerance:
-            return Identifier(arm, None, options.method or USUAL_METHOD, pull, cutoff, robot), how
+        if options.method is not None or options.components is not None or options.tolerance:
+            return Identifier(arm, options.components, options.method or USUAL_METHOD, pull, cutoff, robot), how
         chosen = choose_identifier(arm, recording.runs_to_identify(), cutoff, robot)
         return chosen, [*how, f"estimator: {chosen.manner}, which predicts best on these blocks"]
     groups = candidate_groups(arm)

@@ -133,7 +133,7 @@ class _Writer:
         arm = self.diagnosis.simulation.arm
         joints = {each.claim.joint for each in self.account.findings_of(cause) if each.is_friction}
         own = (each for each in self.account.friction if each.joint in joints and each.torque[1] > 0)
-        rows = sorted(own, key=lambda each: each.torque[1])  # what is no friction by its sign is not known
+        rows = sorted(own, key=lambda each: each.torque[1])  # torque along the motion is no friction
         if not rows:
             return
         low, high = rows[0], rows[-1]

@@ -104,7 +104,7 @@ def verdict_lines(diagnosis: Diagnosis, verbose: bool = False) -> Iterator[str]:
         yield f"  {count_of(len(account.minor), 'small difference')} more, in verdict.json and folded on the page"
     if diagnosis.is_plain:
         yield "  model.yaml holds plain least squares: it predicts blocks of these runs better than the named effects;"
-        yield "  simulators do not take its base parameters: `armlab identify --method physical` has bodies to export"
+        yield "  it has no bodies that a simulator could load: `armlab identify --method physical` finds some"
     for number, step in enumerate(next_steps(diagnosis, account), 1):
         yield from (f"  {line}" for line in wrap(f"next {number}: {step}", LINE_WIDTH - 2))
     if verbose:

@@ -156,7 +156,7 @@ class Moments:
         return np.asarray(np.maximum(np.array(out, dtype=np.float64), 0))
 
 
-SHORTEST_COLUMN = 1e-100  # of squares that can be divided by; a shorter column is none
+SHORTEST_COLUMN = 1e-100  # length of a column; products of shorter ones are too small to divide by
 
 
 def compute_moments(columns: Columns, noise: Noise, observed: Observed) -> Moments:
