@@ -4,6 +4,7 @@ from setuptools import setup
 
 setup(
     cffi_modules=[
+        "algorithms/flight_build.py:ffibuilder",
         "problem/kernel_build.py:ffibuilder",
         "problem/spectra_build.py:ffibuilder",
         "armlab/effects/drive_train_build.py:ffibuilder",

@@ -6,6 +6,7 @@ the box alone and leaves a coordinate inside as it is, to the bit.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -169,7 +170,7 @@ def iterate(
         if question is not None and _price(algorithm, asked, source) > evaluations:
             return
         if walls.lower.shape != asked.shape:
-            walls = Box(*(np.tile(wall, (len(asked), 1)) for wall in box))  # numpy is faster on equal shapes
+            walls = Box(*(np.full(asked.shape, wall) for wall in box))  # numpy is faster on equal shapes
         X = into_box(asked, walls)[:evaluations]
         fitness = _evaluate(objective, X)
         cost = len(X)
@@ -202,27 +203,28 @@ def _checked_points(algorithm: AnyAlgorithm, points: Any, dimension: int) -> Arr
         raise BrokenContractError(
             f"algorithm {algorithm.name!r} asks for points of shape {found.shape}, not (points, {dimension})"
         )
-    if not np.isfinite(found).all():
+    if not isfinite(np.vdot(found, found)) and not np.isfinite(found).all():  # the first is fast, and may overflow
         raise BrokenContractError(f"algorithm {algorithm.name!r} asks for a point with a coordinate that is not finite")
     return np.asarray(found, dtype=np.float64)
 
 
 def summarise_batches(batches: Sequence[Batch]) -> Result:
     """The Result of one run from its batches, in order (at least one)."""
-    X = np.concatenate([batch.X for batch in batches])
     losses = as_loss(np.concatenate([batch.fitness for batch in batches]))
     best = np.minimum.accumulate(losses)
-    improves = np.append(True, losses[1:] < best[:-1])
-    holder = np.maximum.accumulate(np.where(improves, np.arange(len(losses)), 0))  # row of the best so far
-    last = np.cumsum([len(batch.X) for batch in batches]) - 1  # row of the last point of each batch
-    used = np.cumsum([batch.cost for batch in batches])
+    ends = np.array([len(batch.X) for batch in batches]).cumsum()
+    best_so_far = best[ends - 1]
+    rows = (-best).searchsorted(-best_so_far)  # of the best up to there, the first of equals
+    holders = ends.searchsorted(rows, side="right")  # the batches that they are in
+    points = [batches[of].X[row] for of, row in zip(holders, rows - ends[holders], strict=True)]  # rows from the end
+    used = np.array([batch.cost for batch in batches]).cumsum()
     return Result(
-        best_x=X[holder[-1]],
+        best_x=points[-1].copy(),
         best_fitness=float(best[-1]),
         evaluations=int(used[-1]),
         history_evaluations=used,
-        best_so_far=best[last],
-        best_x_history=X[holder[last]],
+        best_so_far=best_so_far,
+        best_x_history=np.array(points),
         present_best=np.array([batch.present_best for batch in batches]),
         final_state=batches[-1].state,
     )

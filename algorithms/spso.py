@@ -17,6 +17,7 @@ What the equations leave open, one way for SPSO and MuPSO:
 - a coordinate that the bound policy moved loses its velocity (Clerc 2012, the form of 2007; the "absorbing wall" of
   Robinson and Rahmat-Samii 2004), because the particle would push against the wall from then on;
 - the swarm moves as one: all bests are updated after the whole population is evaluated.
+`flight.c` has both equations, particle by particle.
 
 Another reading (`reading`), of both: `text` adds nothing to eq. 1-2, no limit of the velocity, and a velocity that goes
 on at the bounds. The paper's program is not published, so there is no reading of it.
@@ -26,71 +27,69 @@ if the new place is better; NiaPy sets w = 1; pymoo adapts its constants; evosax
 """
 
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 
-from algorithms.contract import Box, as_loss
+from algorithms._flight import ffi, lib
+from algorithms.contract import Box
 from algorithms.parameter_types import OURS, NotNegative, Positive, TextReading
 from armlab.common.arrays import Array
+
+_pointer = partial(ffi.from_buffer, ffi.typeof("double *"))
 
 
 @dataclass
 class Swarm:
     """Particles (n, d) with velocities, and each one's best point and fitness (n,) so far.
 
-    velocity_limits (n, d) each: the same rows for all, since numpy adds equal shapes several times faster than rows;
-    infinite in the reading `text`, in which a velocity goes on at the bounds.
+    velocity_limit (d,): infinite in the reading `text`, in which a velocity goes on at the bounds. leader: the particle
+    whose personal best is the global best, the first of equals. The arrays are changed in place and never replaced,
+    since `flight.c` knows where they are.
     """
 
     position: Array
     velocity: Array
-    velocity_limits: Box
     personal_best: Array
     personal_best_fitness: Array
+    velocity_limit: Array
+    leader: int = 0
+
+    def __post_init__(self) -> None:
+        self.memory = ffi.new("Particles *", (*self.position.shape, *map(_pointer, self._arrays())))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Swarm, (*self._arrays(), self.leader)
+
+    def _arrays(self) -> tuple[Array, ...]:
+        return self.position, self.velocity, self.personal_best, self.personal_best_fitness, self.velocity_limit
 
 
 def new_swarm(position: Array, box: Box, velocity_limit: float, reading: TextReading) -> Swarm:
     """Particles at rest that remember nothing; velocity_limit is a fraction of the width of the box."""
-    velocity_limit = np.inf if reading == "text" else velocity_limit
-    limit = np.tile(velocity_limit * (box.upper - box.lower), (len(position), 1))
-    unknown = np.full(len(position), np.inf)
-    return Swarm(position.copy(), np.zeros_like(position), Box(-limit, limit), position.copy(), unknown)
+    position = np.array(position, dtype=np.float64, order="C")
+    limit = np.multiply(np.inf if reading == "text" else velocity_limit, box.upper - box.lower, dtype=np.float64)
+    return Swarm(position, np.zeros(position.shape), position.copy(), np.full(len(position), np.inf), limit)
 
 
 def fly(swarm: Swarm, w: float, c1: float, c2: float, rng: np.random.Generator) -> None:
     """Move all particles: v = w v + c1 r1 (p - x) + c2 r2 (g - x), limited (eq. 2); x = x + v (eq. 1)."""
-    r1, r2 = rng.random((2, *swarm.position.shape))
-    r1 *= swarm.personal_best - swarm.position
-    r1 *= c1
-    pull = np.empty_like(swarm.position)
-    pull[...] = global_best(swarm)[0]
-    pull -= swarm.position
-    r2 *= pull
-    r2 *= c2
-    velocity = swarm.velocity
-    velocity *= w
-    velocity += r1
-    velocity += r2
-    np.minimum(velocity, swarm.velocity_limits.upper, out=velocity)
-    np.maximum(velocity, swarm.velocity_limits.lower, out=velocity)
-    swarm.position += velocity
+    r = rng.random((2, *swarm.position.shape))
+    lib.fly(swarm.memory, swarm.leader, w, c1, c2, _pointer(r))
 
 
 def land(swarm: Swarm, X: Array, fitness: Array) -> None:
     """Take the positions where the bound policy put them and remember what is better than before."""
-    loss = as_loss(fitness)
-    if swarm.velocity_limits.upper[0, 0] < np.inf:
-        np.copyto(swarm.velocity, 0.0, where=swarm.position != X)
-    swarm.position[...] = X
-    better = loss < swarm.personal_best_fitness
-    np.copyto(swarm.personal_best, X, where=better[:, None])
-    np.minimum(swarm.personal_best_fitness, loss, out=swarm.personal_best_fitness)
+    if X.shape != swarm.position.shape or fitness.shape != X.shape[:1]:
+        raise ValueError(f"particles {swarm.position.shape} were told points {X.shape} with fitness {fitness.shape}")
+    told, losses = np.ascontiguousarray(X, np.float64), np.ascontiguousarray(fitness, np.float64)
+    swarm.leader = lib.land(swarm.memory, _pointer(told), _pointer(losses))
 
 
 def global_best(swarm: Swarm) -> tuple[Array, float]:
-    """The best personal best (d,), the first of equals, and its fitness."""
-    leader = swarm.personal_best_fitness.argmin()
-    return swarm.personal_best[leader], float(swarm.personal_best_fitness[leader])
+    """The best personal best (d,) and its fitness."""
+    return swarm.personal_best[swarm.leader], float(swarm.personal_best_fitness[swarm.leader])
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from armlab.common.packages import install_line
 
 State = Literal["ok", "missing", "broken"]
 KERNELS = {
+    "algorithms._flight": "particle swarms",
     "problem._kernel": "observation matrices",
     "problem._spectra": "condition numbers",
     "armlab.effects._drive_train": "play and springs of drive trains",

@@ -1,11 +1,13 @@
 """SPSO and MuPSO step by step, with numbers that can be followed by hand."""
 
+import pickle
+
 import numpy as np
 import pytest
 
 from algorithms.contract import Box
 from algorithms.mupso import MuPSO, MuPSOParams
-from algorithms.spso import SPSO, SPSOParams
+from algorithms.spso import SPSO, SPSOParams, fly, land, new_swarm
 
 
 def column(*values):
@@ -30,6 +32,37 @@ def test_spso_takes_three_steps_as_computed_by_hand(script, walk, interval):
     np.testing.assert_array_equal(asked[3], column(5.25, 4.5))
     assert rng.numbers == []
     assert SPSO.incumbent(state) == (np.array([5.0]), 1.0)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (3, 2), (50, 15), (7, 33)])
+def test_flight_and_landing_are_the_equations_in_numpy_to_the_bit(shape):
+    chance, n = np.random.default_rng(5), shape[0]
+    box = Box(np.full(shape[1], -2.0), np.full(shape[1], 3.0))
+    swarm = new_swarm(chance.uniform(-2, 3, shape), box, 0.3, "ours")
+    x, v, p, best = swarm.position.copy(), np.zeros(shape), swarm.position.copy(), np.full(n, np.inf)
+    for step in range(20):
+        fly(swarm, 0.72, 1.45, 1.5, np.random.default_rng(step))
+        r1, r2 = np.random.default_rng(step).random((2, *shape))
+        g = p[best.argmin()]
+        v = np.clip(0.72 * v + 1.45 * (r1 * (p - x)) + 1.5 * (r2 * (g - x)), -1.5, 1.5)  # eq. 2
+        x = x + v  # eq. 1
+        assert swarm.position.tobytes() == x.tobytes()
+        told, fitness = np.clip(x, *box), chance.choice([np.nan, -np.inf, np.inf, *chance.random(3)], n)
+        land(swarm, np.asfortranarray(told), fitness)
+        v, x, loss = np.where(x == told, v, 0.0), told, np.where(np.isfinite(fitness), fitness, np.inf)
+        better = loss < best
+        p, best = np.where(better[:, None], told, p), np.minimum(loss, best)
+        assert swarm.velocity.tobytes() == v.tobytes()
+        assert swarm.personal_best.tobytes() == p.tobytes()
+        assert (swarm.leader, *swarm.personal_best_fitness) == (best.argmin(), *best)
+        swarm = pickle.loads(pickle.dumps(swarm))
+
+
+def test_a_swarm_that_is_told_other_points_than_it_has_says_so():
+    swarm = new_swarm(np.zeros((3, 2)), Box(np.zeros(2), np.ones(2)), 0.5, "ours")
+    for points, fitness in (((2, 2), 2), ((3, 1), 3), ((3, 2), 4)):
+        with pytest.raises(ValueError, match=r"^particles \(3, 2\) were told points .* with fitness \([234],\)$"):
+            land(swarm, np.zeros(points), np.zeros(fitness))
 
 
 def test_every_coordinate_of_a_particle_has_its_own_random_numbers(script, walk):
