@@ -180,8 +180,9 @@ For the LBR iiwa, the Stäubli TX40, the KUKA KR300 and the ABB IRB 120 no coeff
 github.com/halpersim/parameter_identification (iiwa) has its coefficients in MATLAB files, which could not be read here.
 github.com/nepfaff/robot_payload_id (iiwa 7) and github.com/TUM-ICS/BIRDy (TX40) have programs that compute some,
 github.com/JonasWeigand/Robot_Identification (KR300) has samples of motions. The log src/record.txt of
-github.com/lbr-stack/dynamic_parameter_identification (LBR Med 7, with collisions) has coefficients of a few runs, but
-not their base frequency, and its program adds the sines alone. github.com/thanhndv212/figaroh-examples has points of a
+github.com/lbr-stack/dynamic_parameter_identification (LBR Med 7, with collisions; arXiv 2401.16566) has coefficients of
+a few runs. The bounds that they touch say that their base frequency is 0.1 Hz, as in its program, which adds the sines
+alone; about which position the joints move is not written. github.com/thanhndv212/figaroh-examples has points of a
 spline for a simulated UR10. So no published motion that keeps off itself could be recomputed."""
 
 
