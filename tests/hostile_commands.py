@@ -175,11 +175,18 @@ def locked_robots() -> dict[str, str]:
 
 
 @cache
-def exported_record() -> tuple[dict[str, Any], dict[str, Any]]:
-    """The problem of the exported record, and a file of records that has this one alone."""
+def known_record(name: str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """A record, and a file of records that has this one alone."""
     content = json.loads((Path(__file__).parents[1] / "results" / "best_known.json").read_text(encoding="utf-8"))
-    record = content["problems"][RECORD]
-    return record["settings"], content | {"problems": {RECORD: record}}
+    record = content["problems"][name]
+    return record, content | {"problems": {name: record}}
+
+
+def submission(name: str) -> dict[str, Any]:
+    """A smaller motion than that of a record, within all its limits."""
+    record, _ = known_record(name)
+    smaller = {key: 0.5 * value for key, value in record["coefficients"].items()}
+    return {"problem": name, "coefficients": smaller, "by": "somebody", "source": "a page"}
 
 
 def mutate(content: Any, rng: random.Random) -> Any:
@@ -265,8 +272,14 @@ def _write_inputs(folder: Path, rng: random.Random, damaged: str) -> None:
     (folder / "earlier").mkdir()
     (folder / "earlier" / "next.json").write_text(json.dumps(verdict))
     (folder / "records").mkdir()
-    problem, records = exported_record()
-    for name, content in (("problem.yaml", problem), ("records/best_known.json", records)):
+    (record, records), (_, safe) = known_record(RECORD), known_record(SAFE_RECORD)
+    for name, content in (
+        ("problem.yaml", record["settings"]),
+        ("records/best_known.json", records),
+        ("records/safe.json", safe),
+        ("submission.yaml", submission(RECORD)),
+        ("safe-submission.yaml", submission(SAFE_RECORD)),
+    ):
         whole = mutate(content, rng) if Path(name).stem == damaged else content
         text = yaml.safe_dump(whole) if name.endswith(".yaml") else json.dumps(whole)
         (folder / name).write_text(text)
@@ -296,6 +309,7 @@ def _write_results(folder: Path, rng: random.Random, damaged: str) -> None:
 
 
 RECORD = "joint-fourier-rest-250hz"
+SAFE_RECORD = "suite-4/irb120-all-si-floor"
 EXPORT = f"bench export problem.yaml --record {RECORD} --results records --format ros2 --rate 250"
 NEXT = "next verdict.json --robot arm.yaml --evaluations 50 --duration 2 --rate 100 --harmonics 3 --out next"
 COMMANDS = {
@@ -327,6 +341,8 @@ COMMANDS = {
     "draw": "bench draw shared --out drawn",
     "share": "bench share shared --as latex --out tables",
     "compare": "bench compare shared shared --out compared",
+    "submit": "bench submit submission.yaml --records records/best_known.json",
+    "submit-safe": "bench submit safe-submission.yaml --records records/safe.json",
     "export": f"{EXPORT} --out motion.yaml",
     "export-over-problem": f"{EXPORT} --out problem.yaml",
     "export-over-records": f"{EXPORT} --out records/best_known.json",
@@ -399,6 +415,10 @@ KINDS = (
     Kind("next-robot", "nothing", 1),
     Kind("next-over-verdict", "nothing", 1),
     Kind("next-into-file", "nothing", 1),
+    Kind("submit", "submission", 60),
+    Kind("submit", "best_known", 40),
+    Kind("submit", "words", 20),
+    Kind("submit-safe", "safe-submission", 30),
     Kind("export", "problem", 40),
     Kind("export", "best_known", 40),
     Kind("export", "words", 60),

@@ -96,6 +96,7 @@ def _translate(detail: ErrorDetails) -> str:
 _PYDANTIC_WORDS: dict[str, Callable[[ErrorDetails], str]] = {
     "too_short": lambda detail: f"should hold {detail['ctx']['min_length']} or more entries",
     "too_long": lambda detail: f"should hold {detail['ctx']['max_length']} entries or fewer",
+    "string_too_short": lambda detail: "should not be empty",
     "string_pattern_mismatch": lambda detail: f"should have the form {detail['ctx']['pattern']}",
 }
 

@@ -99,7 +99,7 @@ def test_numbers_that_are_far_too_large_break_a_limit(submit: Callable[..., list
 
 
 def test_mistakes_in_a_submission_are_told_in_one_line(submit: Callable[..., list[str]]) -> None:
-    assert refusal(submit, gentle(), problem="smal").endswith("no record 'smal': did you mean 'small'?")
-    assert "coefficients lacks a1_1 and 19 more of 20" in refusal(submit, gentle(), coefficients={})
+    assert refusal(submit, gentle(), problem="smal").endswith("records.json: did you mean 'small'?")
+    assert "coefficients lacks 20 of 20, a1_1 the first" in refusal(submit, gentle(), coefficients={})
     extra = dict.fromkeys((*problem_of(SETTINGS).trajectory.names, "a9_1"), 0.0)
     assert "unknown coefficient 'a9_1'" in refusal(submit, gentle(), coefficients=extra)

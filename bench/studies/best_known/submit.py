@@ -35,14 +35,15 @@ def judge_submission(path: Path, records: Path) -> ResultLines:
     """
     submission, known = validate(Submission, read_yaml(path), str(path)), read_records(records)
     if submission.problem not in known:
-        raise InputError(f"{path}: no record '{submission.problem}': {suggest_name(submission.problem, list(known))}")
+        hint = suggest_name(submission.problem, list(known))
+        raise InputError(f"{path}: no record '{submission.problem[:60]}' in {records}: {hint}")
     record = known[submission.problem]
     settings = parse_record(record, submission.problem, records)
     problem = build_excitation(settings, submission.problem)
     check_supported(problem, submission.problem)
     names = problem.trajectory.names
     if missing := [name for name in names if name not in submission.coefficients]:
-        raise InputError(f"{path}: coefficients lacks {missing[0]} and {len(missing) - 1} more of {len(names)}")
+        raise InputError(f"{path}: coefficients lacks {len(missing)} of {len(names)}, {missing[0]} the first")
     if unknown := [name for name in submission.coefficients if name not in names]:
         raise InputError(f"{path}: unknown coefficient '{unknown[0]}': {suggest_name(unknown[0], list(names))}")
     point = np.array([submission.coefficients[name] for name in names])
