@@ -16,7 +16,7 @@ from armlab.common.errors import InputError
 from armlab.common.settings import Settings, read_yaml, validate
 from bench.executors.contract import ExecutorSettings
 from problem.callables import callable_name
-from problem.suite import instances, suites
+from problem.registry import instances, suites
 
 NAME_PATTERN = "[A-Za-z0-9][A-Za-z0-9_-]{0,99}"  # of an experiment: part of the names of its files
 

@@ -1,6 +1,7 @@
 """Problems by the name of their preset: built-in ones, and third parties' of the entry-point group `armlab.problems`.
 
-Names are found without importing anything, so a broken plug-in affects only those who use it.
+A suite of a third party, of the group `armlab.suites`, is a mapping of names to settings of such problems. Names of
+presets and suites are found without importing anything, so a broken plug-in affects only those who use it.
 """
 
 from collections.abc import Mapping
@@ -11,6 +12,7 @@ from typing import Any
 from armlab.common.errors import InputError
 from armlab.common.plug_ins import BrokenPlugInError, load_plug_in
 from armlab.common.settings import Settings, suggest_name, validate
+from problem import suite as built_in
 from problem.callables import CallableSettings
 from problem.functions import FUNCTIONS
 from problem.presets import (
@@ -19,9 +21,10 @@ from problem.presets import (
     PaperSettings,
     RandomFrameSettings,
 )
-from problem.suite import InstanceSettings, instances, suites
+from problem.suite import InstanceSettings
 
 ENTRY_POINT_GROUP = "armlab.problems"
+SUITE_GROUP = "armlab.suites"
 
 ProblemSettings = PaperSettings | JointFourierSettings | FunctionSettings | InstanceSettings | CallableSettings
 PRESETS: Mapping[str, type[ProblemSettings]] = MappingProxyType(
@@ -30,7 +33,7 @@ PRESETS: Mapping[str, type[ProblemSettings]] = MappingProxyType(
         "joint-fourier": JointFourierSettings,
         "random-frame": RandomFrameSettings,
         **dict.fromkeys(FUNCTIONS, FunctionSettings),
-        **{name: InstanceSettings for suite in suites() for name in instances(suite)},
+        **{name: InstanceSettings for suite in built_in.suites() for name in built_in.instances(suite)},
     }
 )
 
@@ -44,6 +47,33 @@ def names() -> list[str]:
 def plug_ins() -> list[EntryPoint]:
     """The problems that other packages registered, each a class of settings with `build`."""
     return list(entry_points(group=ENTRY_POINT_GROUP))
+
+
+def suites() -> list[str]:
+    """Names of all suites, the plug-ins' last."""
+    return [*built_in.suites(), *sorted(entry.name for entry in entry_points(group=SUITE_GROUP))]
+
+
+def instances(suite: str) -> list[str]:
+    """Full names of the problems of a suite, in its order. Raises InputError for one that is unknown or broken."""
+    plugged = _suite_of_plug_in(suite)
+    return built_in.instances(suite) if plugged is None else [f"{suite}/{name}" for name in plugged]
+
+
+def _suite_of_plug_in(name: str) -> Mapping[str, Settings] | None:
+    """The problems of a plug-in's suite by their names in it; None where no plug-in has a suite of that name."""
+    for entry in entry_points(group=SUITE_GROUP):
+        if entry.name == name:
+            try:
+                problems: Mapping[str, Settings] = load_plug_in(entry)
+            except BrokenPlugInError as error:
+                raise InputError(f"suite '{name}' ({entry.value}) cannot be imported: {error}") from error
+            if not isinstance(problems, Mapping) or not all(
+                isinstance(each, Settings) and hasattr(each, "preset") for each in problems.values()
+            ):
+                raise InputError(f"suite '{name}' ({entry.value}) should map names to settings of problems")
+            return problems
+    return None
 
 
 def is_plug_in(settings: ProblemSettings) -> bool:
@@ -64,6 +94,12 @@ def parse_problem(data: Mapping[str, Any], where: str) -> ProblemSettings:
         return validate(CallableSettings, dict(data), where)
     if not isinstance(preset, str):
         raise InputError(f"{where}: should hold `preset: NAME`, one of {', '.join(names())}")
+    suite, _, name = preset.partition("/")
+    if name and (plugged := _suite_of_plug_in(suite)) is not None:
+        if name not in plugged:
+            raise InputError(f"{where}: suite '{suite}' has no problem '{name}': {suggest_name(name, list(plugged))}")
+        data = dict(plugged[name]) | {key: value for key, value in data.items() if key != "preset"}
+        preset = data["preset"]
     return validate(settings_type(preset, where), dict(data), where)
 
 

@@ -32,22 +32,21 @@ def list_names() -> ResultLines:
     from algorithms import registry as algorithms
     from problem import registry as problems
     from problem.robot_file import built_in_arms
-    from problem.suite import instances, suites
 
     document: Document = {
         "algorithms": algorithms.names(),
         "peers": algorithms.peer_names(),
         "with_derivatives": algorithms.names_with_derivatives(),
         "problems": problems.names(),
-        "suites": {suite: instances(suite) for suite in suites()},
+        "suites": {suite: problems.instances(suite) for suite in problems.suites()},
         "arms": built_in_arms(),
     }
     yield "algorithms: " + ", ".join(document["algorithms"])
     yield "peers (extra `peers`): " + ", ".join(document["peers"])
     yield "with derivatives: " + ", ".join(document["with_derivatives"])
     yield "problems: " + ", ".join(document["problems"])
-    for suite in suites():
-        yield f"suite {suite}: {len(instances(suite))} problems, {instances(suite)[0]} the first"
+    for suite, members in document["suites"].items():
+        yield f"suite {suite}: {len(members)} problems, {members[0]} the first"
     yield "arms: " + ", ".join(document["arms"])
     return document
 

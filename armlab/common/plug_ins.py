@@ -24,7 +24,7 @@ import numpy as np
 from armlab.common.errors import InputError, describe_failure
 from armlab.common.files import write_whole
 
-GROUPS = ("armlab.algorithms", "armlab.problems", "armlab.effects")
+GROUPS = ("armlab.algorithms", "armlab.problems", "armlab.suites", "armlab.effects")
 IMPORT_LIMIT_S = 20.0
 _OWN_PACKAGES = ("algorithms", "armlab", "bench", "problem")
 

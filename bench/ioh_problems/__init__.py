@@ -14,8 +14,7 @@ import ioh
 import numpy as np
 
 from armlab.common.arrays import Array
-from problem.registry import parse_problem
-from problem.suite import instances
+from problem.registry import instances, parse_problem
 
 
 class SuiteProblem(ioh.problem.RealSingleObjective):  # type: ignore[misc]

@@ -1,5 +1,7 @@
 """The preset `tell-apart` among the problems of the benchmark."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from next_questions import points, told_apart
@@ -8,8 +10,11 @@ from refusals import refusal
 from armlab.common.settings import validate
 from armlab.diagnosis.next.motion import Budget, random_point, search_motion
 from armlab.diagnosis.next.problem import RivalSettings, TellApartSettings
+from bench.execute import canonical
+from bench.studies.best_known.records import read_records
 from problem.contract_suite import ProblemContract
 from problem.excitation import ShiftedProblem
+from problem.registry import instances, parse_problem
 
 
 class TestTellApart(ProblemContract):
@@ -20,6 +25,13 @@ def test_its_value_is_one_over_its_strength() -> None:
     problem = told_apart()
     drawn = points(problem, 3)
     assert problem.evaluate(drawn).value == pytest.approx([1 / problem.strength(point) for point in drawn])
+
+
+def test_no_question_of_its_suite_is_ever_changed() -> None:
+    records = read_records(Path(__file__).parents[2] / "results" / "best_known.json")
+    for name in instances("tell-apart-1"):
+        settings = parse_problem({"preset": name}, "test")
+        assert canonical(settings.model_dump(mode="json")) == canonical(records[name.replace("-1/", "-")].settings)
 
 
 def test_its_settings_have_a_hash_as_the_runner_needs_it() -> None:

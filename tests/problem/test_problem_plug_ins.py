@@ -13,7 +13,7 @@ from problem import registry
 from problem.contract import Evaluation
 from problem.contract_suite import ProblemContract
 from problem.presets import FunctionSettings
-from problem.registry import ENTRY_POINT_GROUP, names, parse_problem
+from problem.registry import ENTRY_POINT_GROUP, SUITE_GROUP, instances, names, parse_problem, suites
 
 Register = Callable[..., None]
 
@@ -83,6 +83,31 @@ def test_a_name_that_is_registered_twice_is_refused(plug_ins: Register) -> None:
     assert message == (
         "mine.yaml: preset 'sphere' is registered more than once: problem.presets:PaperSettings; it is built in"
     )
+
+
+MINE = {"round": FunctionSettings(preset="sphere", dimension=3)}
+
+
+def test_a_suite_of_a_plug_in_gives_its_problems_by_name_and_a_mistake_in_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    values = {
+        "mine-1": f"{__name__}:MINE",
+        "broken-1": "no_such_module_anywhere:X",
+        "odd-1": "problem.functions:sphere",
+    }
+    entries = [EntryPoint(name, value, SUITE_GROUP) for name, value in values.items()]
+    monkeypatch.setattr(registry, "entry_points", lambda group: entries if group == SUITE_GROUP else [])
+    assert suites()[-3:] == ["broken-1", "mine-1", "odd-1"]
+    assert instances("mine-1") == ["mine-1/round"]
+    found = parse_problem({"preset": "mine-1/round", "shift_seed": 2}, "mine.yaml")
+    assert found == FunctionSettings(preset="sphere", dimension=3, shift_seed=2)
+    for preset, message in (
+        ("mine-1/rond", "mine.yaml: suite 'mine-1' has no problem 'rond': did you mean 'round'?"),
+        ("broken-1/x", "suite 'broken-1' (no_such_module_anywhere:X) cannot be imported: "),
+        ("odd-1/x", "suite 'odd-1' (problem.functions:sphere) should map names to settings of problems"),
+    ):
+        assert refusal(parse_problem, {"preset": preset}, "mine.yaml").startswith(message)
 
 
 def _test(name: str) -> Callable[[], None]:

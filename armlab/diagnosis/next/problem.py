@@ -2,8 +2,10 @@
 a configuration.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Literal
 
 import numpy as np
@@ -198,3 +200,24 @@ class TellApartSettings(Settings):
         finding = VerdictFinding(first, () if first.joint is None else (first.joint,), parameters, tuple(others))
         noise = np.array(per_joint_values("noise", self.noise, arm))
         return VerdictWithModel(Path("tell-apart"), (finding,), noise, self.cutoff_hz)
+
+
+SUITE_1: Mapping[str, TellApartSettings] = MappingProxyType(
+    {
+        "viscous-or-late": TellApartSettings(),
+        "spring-or-compensator": TellApartSettings(
+            rivals=(
+                RivalSettings(effect="cable_stiffness", joint=2, parameters=(("stiffness", 1.0), ("rest", 0.1))),
+                RivalSettings(effect="gravity_compensator", joint=2),
+            )
+        ),
+        "level-load-or-speed": TellApartSettings(
+            rivals=(
+                RivalSettings(effect="coulomb_friction", joint=2, parameters=(("level", 0.2),)),
+                RivalSettings(effect="load_dependent_friction", joint=2),
+                RivalSettings(effect="nonlinear_viscous_friction", joint=2),
+            )
+        ),
+    }
+)
+"""The suite `tell-apart-1`: three questions about the second joint. None is ever changed."""
