@@ -24,7 +24,8 @@ costs beside its search, of one core: its key, its way to a worker and back, the
 _UNKNOWN = ("until all are there, s", "a batch through Dask, ms", "memory, MB", "open files")  # where something broke
 _CLUSTER_READING = """\
 Simulated: workers of `distributed` in one process with the scheduler and the command, each with its own connections
-by TCP and its heartbeat. Not simulated: processors of their own, a network, Slurm. Batches are 400, of one trial of
+by TCP and its heartbeat; what a worker does to watch itself (profile, event loop, memory) is off, since all share one
+interpreter. Not simulated: processors of their own, a network, Slurm. Batches are 400, of one trial of
 50 evaluations each; a real batch has 20,000 evaluations, 400 such trials. *Dispatch*: what the command itself does
 for a batch, with twice as many batches under way as there are workers. *Through Dask*: the whole way of a batch, the
 trial included, on the one core that all workers share here: an upper bound of what scheduler and messages take.
