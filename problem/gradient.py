@@ -35,7 +35,7 @@ from problem.regressor import observation_matrix
 from problem.trajectories import CartesianFourier, JointFourier, Trajectory
 
 
-class Excitation(Protocol):
+class DifferentiableExcitation(Protocol):
     """What a gradient asks of an excitation problem: `problem.excitation.ExcitationProblem` is one."""
 
     @property
@@ -197,7 +197,7 @@ _TRIGONOMETRIC_STENCIL = (
 _QUADRATIC_STENCIL = ((1.0, 0.5), (-1.0, -0.5))  # exact for a polynomial of degree 2, whatever the step
 
 
-def condition_gradient(problem: Excitation, point: Array) -> tuple[float, Array]:
+def condition_gradient(problem: DifferentiableExcitation, point: Array) -> tuple[float, Array]:
     """Condition number of a point (dimension,) and its gradient (dimension,), without weights and penalty.
 
     Where the largest or the smallest singular value is a multiple one, this is one of several
@@ -214,12 +214,14 @@ def condition_with_derivatives(values: Array) -> tuple[float, Array]:
     return float(values[0] / values[-1]), slope
 
 
-def motion_of(problem: Excitation, point: Array) -> Motion:
+def motion_of(problem: DifferentiableExcitation, point: Array) -> Motion:
     """The motion (samples, joints) of a point (dimension,)."""
     return problem.trajectory.motions(point[None], problem.times).motion.select(np.intp(0))
 
 
-def spectral_gradient(problem: Excitation, point: Array, function: SpectralFunction) -> tuple[float, Array]:
+def spectral_gradient(
+    problem: DifferentiableExcitation, point: Array, function: SpectralFunction
+) -> tuple[float, Array]:
     """A function of the singular values of a point's observation matrix, and its gradient (dimension,)."""
     motion = motion_of(problem, point)
     basis = tangents(problem.trajectory, motion, point, problem.times)
@@ -227,7 +229,7 @@ def spectral_gradient(problem: Excitation, point: Array, function: SpectralFunct
 
 
 def spectral_gradient_along(
-    problem: Excitation, motion: Motion, basis: Array, function: SpectralFunction
+    problem: DifferentiableExcitation, motion: Motion, basis: Array, function: SpectralFunction
 ) -> tuple[float, Array]:
     """The same for a motion (samples, joints) with its tangents (3, dimension, samples, joints)."""
     value, weights = _matrix_weights(problem, motion, function)
@@ -273,7 +275,9 @@ def _viscous_weights(weights: Array, motion: Motion) -> Array:
     return np.asarray(by_joint[:, joints, joints, VISCOUS])
 
 
-def _matrix_weights(problem: Excitation, motion: Motion, function: SpectralFunction) -> tuple[float, Array]:
+def _matrix_weights(
+    problem: DifferentiableExcitation, motion: Motion, function: SpectralFunction
+) -> tuple[float, Array]:
     """The function's value and its derivative with respect to each entry of the whole matrix.
 
     That is the observation matrix, and behind it the friction columns where the problem has them. Infinite, with

@@ -16,7 +16,7 @@ from armlab.common.derivatives import Derivatives, Question
 from problem.arm import Limits
 from problem.feasible import FeasibleFourier
 from problem.fitness import Criterion
-from problem.gradient import Excitation, SpectralFunction, motion_of, spectral_gradient_along, tangents
+from problem.gradient import DifferentiableExcitation, SpectralFunction, motion_of, spectral_gradient_along, tangents
 from problem.motion import Motion
 
 
@@ -58,7 +58,7 @@ class LimitRows:
     come close.
     """
 
-    problem: Excitation
+    problem: DifferentiableExcitation
 
     def distances(self, motion: Motion) -> Array:
         """Distances (rows,) of a motion (samples, joints); negative where a limit is broken."""
@@ -88,7 +88,7 @@ class LimitRows:
         return low, high, np.where(np.isfinite(high - low), (high - low) / 2, 1.0)
 
 
-def differentiate(problem: Excitation, rows: LimitRows, point: Array, question: Question) -> Derivatives:
+def differentiate(problem: DifferentiableExcitation, rows: LimitRows, point: Array, question: Question) -> Derivatives:
     """The answer of an excitation problem to a question about a point (dimension,)."""
     with np.errstate(all="ignore"):  # a line search may leave what the arm can reach
         motion = motion_of(problem, point)

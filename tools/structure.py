@@ -91,7 +91,7 @@ def main() -> None:
     print(f"modules with one importer: {sum(len(each) == 1 for each in importers.values())}")
     print(f"longest chain of imports in the diagnosis: {len(longest_chain(importers, 'armlab.diagnosis'))}")
     names = names_twice(trees)
-    print(f"names that stand twice in a package of armlab: {', '.join(names) or 'none'}")
+    print(f"names that stand twice in a package: {', '.join(names) or 'none'}")
     print(f"functions named by a participle: {sum(count_participles(each) for each in trees.values())}")
     naming = files_naming_an_effect(sources)
     print(f"files outside the library (and the truth machine) that name an effect: {len(naming)}")
@@ -141,15 +141,13 @@ def longest_chain(importers: dict[str, set[str]], package: str) -> list[str]:
 
 
 def names_twice(trees: dict[Path, ast.Module]) -> dict[str, list[Path]]:
-    """Names of classes, and of files, that stand in more than one place of a package of armlab: `armlab/proof: Plan`.
+    """Names of classes, and of files, that stand in more than one place of a package: `armlab/proof: Plan`.
 
-    `bench` is a folder of studies, each with a page of its own.
+    The packages are those of armlab, and each other folder of `ROOTS` as a whole.
     """
     places: dict[str, list[Path]] = defaultdict(list)
     for path, tree in trees.items():
-        if path.parts[0] != "armlab":
-            continue
-        package = "/".join(path.parts[:2])
+        package = "/".join(path.parts[: 2 if path.parts[0] == "armlab" else 1])
         if path.name != "__init__.py":
             places[f"{package}: {path.name}"].append(path)
         for node in tree.body:

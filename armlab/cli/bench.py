@@ -191,7 +191,7 @@ def tune(
     """
     from joblib import cpu_count
 
-    from bench.studies.tuning.study import TuningOptions, tune_algorithms
+    from bench.studies.tuning.tuning_study import TuningOptions, tune_algorithms
 
     records = Path("results/best_known.json")
     options = TuningOptions(algorithms, budget, store, results, records, workers or cpu_count(), overwrite)
@@ -235,7 +235,7 @@ def landscape(out: Path, workers: int | None, store: Path, pages: bool, results:
     """
     from joblib import cpu_count
 
-    from bench.studies.landscape.study import LandscapeOptions, make_landscape
+    from bench.studies.landscape.landscape_study import LandscapeOptions, make_landscape
 
     options = LandscapeOptions(results, out, store, workers or cpu_count(), pages)
     return written_files(make_landscape(options, trial_bar))

@@ -62,7 +62,7 @@ def study(**options: Any) -> Iterator[str]:
     Six joints, randomly shifted coordinates, equal evaluations, larger budgets, and MuPSO's ingredients one by one.
     Writes into results/study/.
     """
-    from bench.studies.beyond_paper.study import describe_study, make_study
+    from bench.studies.beyond_paper.beyond_paper_study import describe_study, make_study
 
     return _make_study(make_study, describe_study, **options)
 
@@ -75,7 +75,7 @@ def search_space(**options: Any) -> Iterator[str]:
 
     Every algorithm in both, and what the feasible one gives up of the best known: configs/search_space.yaml.
     """
-    from bench.studies.search_space.study import describe_search_space, make_search_space
+    from bench.studies.search_space.search_space_study import describe_search_space, make_search_space
 
     return _make_study(make_search_space, describe_search_space, **options)
 
@@ -91,7 +91,7 @@ def does_it_help(workers: int | None, results: Path) -> ResultLines:
     """
     from joblib import cpu_count
 
-    from bench.studies.does_it_help.study import make_does_it_help as answer
+    from bench.studies.does_it_help.help_study import make_does_it_help as answer
 
     return written_files(answer(results, workers or cpu_count()))
 

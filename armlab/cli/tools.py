@@ -81,7 +81,7 @@ def speed(results: Path) -> ResultLines:
     The others are Pinocchio, CasADi, mealpy, pygmo and scipy (extra `peers`). Writes speed.json and speed.md. Needs a C
     compiler, and a C++ compiler for the code built by hand.
     """
-    from bench.studies.speed.report import write_speed_report
+    from bench.studies.speed.speed_page import write_speed_report
 
     return written_files(write_speed_report(results))
 
@@ -112,7 +112,7 @@ def scale(context: click.Context, trials: int, kills: int | None, workers: int |
     Writes scale.md. With --kills: kills processes at random times and writes kills.md; exit code 1 if an outcome
     was lost. With --workers: writes cluster.md.
     """
-    from bench.studies.scale.report import write_cluster, write_kills, write_scale
+    from bench.studies.scale.scale_page import write_cluster, write_kills, write_scale
 
     configs, unharmed = Path("configs"), True
     if kills:

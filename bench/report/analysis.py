@@ -46,7 +46,7 @@ class RunProgress:
 
 
 @dataclass(frozen=True, eq=False)
-class Cell:
+class ProblemAnalysis:
     """One problem, swarm size and budget: its trials, and the progress of its runs by algorithm.
 
     moments: numbers of evaluations, evenly spaced in the logarithm, from the first population to the budget. targets:
@@ -120,12 +120,12 @@ class Cell:
         return duels(self.trials, [(a, b) for k, a in enumerate(names) for b in names[k + 1 :]])
 
 
-def analyse_cells(results: ResultSet) -> list[Cell]:
+def analyse_cells(results: ResultSet) -> list[ProblemAnalysis]:
     """All cells in the order of the configuration; the runs of only one cell are in memory at a time."""
     return [analyse_cell(label, trials, runs_by_algorithm(trials, curves)) for label, trials, curves in results.cells()]
 
 
-def losses_by_problem(cells: Sequence[Cell]) -> pd.DataFrame:
+def losses_by_problem(cells: Sequence[ProblemAnalysis]) -> pd.DataFrame:
     """Losses to rank: one row a problem, medians, averaged over its swarm sizes and budgets; one column an algorithm.
 
     With one cell only, one row a repetition.
@@ -134,7 +134,7 @@ def losses_by_problem(cells: Sequence[Cell]) -> pd.DataFrame:
     return losses if len(cells) == 1 else losses.groupby([cell.problem for cell in cells], sort=False).mean()
 
 
-def analyse_cell(label: str, trials: pd.DataFrame, numbered: Mapping[str, Mapping[int, Run]]) -> Cell:
+def analyse_cell(label: str, trials: pd.DataFrame, numbered: Mapping[str, Mapping[int, Run]]) -> ProblemAnalysis:
     """A cell from its runs by algorithm and repetition; trials: tidy, of one budget."""
     runs = {name: [by_number[k] for k in sorted(by_number)] for name, by_number in numbered.items()}
     budget = int(trials["budget"].iloc[0])
@@ -143,7 +143,7 @@ def analyse_cell(label: str, trials: pd.DataFrame, numbered: Mapping[str, Mappin
     targets = _choose_targets([run for some in runs.values() for run in some])
     progress = {name: _summarise_progress(some, moments, targets, budget) for name, some in runs.items()}
     rated = targets[[round(share * (len(targets) - 1)) for share in TARGET_SHARES]] if len(targets) else targets
-    return Cell(
+    return ProblemAnalysis(
         label,
         trials,
         moments,
@@ -165,7 +165,7 @@ def _by_repetition(
     )
 
 
-def share_of_targets_reached(cells: Sequence[Cell], algorithm: str, moments: Array) -> Array:
+def share_of_targets_reached(cells: Sequence[ProblemAnalysis], algorithm: str, moments: Array) -> Array:
     """Share of targets reached at moments (moments,), over all runs and all cells with targets."""
     found = [cell.progress[algorithm].hits for cell in cells if len(cell.targets)]
     return share_reached(found, moments) if found else np.zeros(len(moments))

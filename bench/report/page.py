@@ -21,7 +21,7 @@ from armlab.common.files import write_whole
 from armlab.common.report.page import render_page
 from armlab.common.report.palette import SeriesStyle, series_style
 from bench.report import sections
-from bench.report.analysis import Cell, analyse_cells, losses_by_problem, share_of_targets_reached
+from bench.report.analysis import ProblemAnalysis, analyse_cells, losses_by_problem, share_of_targets_reached
 from bench.report.ranking_chart import draw_critical_difference
 from bench.result_sets.formats import make_folder, read_results
 from bench.result_sets.result_set import ResultSet
@@ -40,7 +40,7 @@ _PROFILE_FACTORS = np.geomspace(1.0, 10.0, 60)
 _CURVE_POINTS = 60
 
 
-def page_data(cells: Sequence[Cell], algorithms: Sequence[str]) -> str:
+def page_data(cells: Sequence[ProblemAnalysis], algorithms: Sequence[str]) -> str:
     """The data of the charts as JSON; numbers have four digits, null stands for an infinite one."""
     content = {
         "algorithms": list(algorithms),
@@ -50,7 +50,7 @@ def page_data(cells: Sequence[Cell], algorithms: Sequence[str]) -> str:
     return json.dumps(content, separators=(",", ":"), allow_nan=False)
 
 
-def _problem_data(cell: Cell) -> dict[str, Any]:
+def _problem_data(cell: ProblemAnalysis) -> dict[str, Any]:
     curves = {name: cell.progress[name].quartiles for name in cell.algorithms}
     return {
         "name": cell.label,
@@ -66,7 +66,7 @@ def _problem_data(cell: Cell) -> dict[str, Any]:
     }
 
 
-def _time_data(cell: Cell) -> dict[str, Any]:
+def _time_data(cell: ProblemAnalysis) -> dict[str, Any]:
     """Medians of the best so far against seconds of one core, on one grid for all; null before a run's first and after
     its last evaluation. Empty where results came without seconds.
     """
@@ -92,13 +92,13 @@ def _value_at(grid: Array, times: Array, values: Array) -> Array:
     return np.where(there, values[np.maximum(place, 0)], np.inf)
 
 
-def _shown_values(cell: Cell) -> Array:
+def _shown_values(cell: ProblemAnalysis) -> Array:
     """Every value of the charts of a problem."""
     parts = [cell.ends(name) for name in cell.algorithms]
     return np.concatenate([*parts, *(cell.progress[name].quartiles.ravel() for name in cell.algorithms)])
 
 
-def _overall_data(cells: Sequence[Cell], algorithms: Sequence[str]) -> dict[str, Any]:
+def _overall_data(cells: Sequence[ProblemAnalysis], algorithms: Sequence[str]) -> dict[str, Any]:
     first = min(cell.moments[0] for cell in cells)
     moments = np.unique(np.geomspace(first, max(cell.moments[-1] for cell in cells), _CURVE_POINTS).round())
     medians = [{name: cell.summary(name).median for name in cell.algorithms} for cell in cells]
@@ -111,7 +111,7 @@ def _overall_data(cells: Sequence[Cell], algorithms: Sequence[str]) -> dict[str,
     }
 
 
-def _quartiles(cell: Cell, algorithm: str) -> Array:
+def _quartiles(cell: ProblemAnalysis, algorithm: str) -> Array:
     summary = cell.summary(algorithm)
     return np.array([summary.lower_quartile, summary.median, summary.upper_quartile])
 
@@ -123,7 +123,7 @@ def _to_json_numbers(values: Array) -> list[float | None]:
 _SCRIPTS = ("scales.js", "lines.js", "boxes.js", "page.js")
 
 
-def report_page(results: ResultSet, cells: Sequence[Cell], facts: Sequence[AlgorithmProperties]) -> str:
+def report_page(results: ResultSet, cells: Sequence[ProblemAnalysis], facts: Sequence[AlgorithmProperties]) -> str:
     """The page as HTML; facts: properties of the algorithms that took part and are registered here."""
     looks = {name: series_style(index) for index, name in enumerate(results.algorithms)}
     losses = [cell.losses for cell in cells]

@@ -10,7 +10,7 @@ from algorithms.registry import BrokenAlgorithmError, UnknownAlgorithmError, is_
 from armlab.common.report.page import Table
 from armlab.common.report.wording import count_of
 from bench.fingerprint import calls_lapack
-from bench.report.analysis import BUDGET_SHARES, TARGET_SHARES, Cell
+from bench.report.analysis import BUDGET_SHARES, TARGET_SHARES, ProblemAnalysis
 from bench.result_sets.result_set import ResultSet
 from bench.statistics.critical_difference import ERROR_RATE, CriticalDifference
 from bench.statistics.pairwise import Duel
@@ -20,7 +20,7 @@ from bench.studies import properties as properties_table
 from bench.studies.properties import AlgorithmProperties
 
 
-def ends_table(cell: Cell) -> Table:
+def ends_table(cell: ProblemAnalysis) -> Table:
     """Medians with intervals, quartiles, feasible share, area and expected running times on one problem."""
     places = [round(share * (len(cell.targets) - 1)) for share in TARGET_SHARES] if len(cell.targets) else []
     headings = ["algorithm", "median (95 %)", "quartiles", "minimum", "feasible", "area"]
@@ -29,7 +29,7 @@ def ends_table(cell: Cell) -> Table:
     return Table(headings, [_ends_row(cell, name, places) for name in cell.algorithms])
 
 
-def _ends_row(cell: Cell, name: str, places: Sequence[int]) -> list[str]:
+def _ends_row(cell: ProblemAnalysis, name: str, places: Sequence[int]) -> list[str]:
     summary, progress = cell.summary(name), cell.progress[name]
     low, high = cell.median_interval(name)
     return [
@@ -44,7 +44,7 @@ def _ends_row(cell: Cell, name: str, places: Sequence[int]) -> list[str]:
     ]
 
 
-def _time_cells(cell: Cell, name: str) -> list[str]:
+def _time_cells(cell: ProblemAnalysis, name: str) -> list[str]:
     """Median seconds of a run, and its work an evaluation."""
     if "seconds" not in cell.trials:
         return []
@@ -52,7 +52,7 @@ def _time_cells(cell: Cell, name: str) -> list[str]:
     return [format_number(float(rows["seconds"].median())), format_number(cell.work(name))]
 
 
-def duels_table(cell: Cell) -> Table:
+def duels_table(cell: ProblemAnalysis) -> Table:
     """The algorithm with the least median against all others."""
     best = min(cell.algorithms, key=lambda name: float(np.median(cell.losses[name])))
     fought = [_duel_from_side_of(best, duel) for duel in cell.all_duels if best in (duel.subject, duel.rival)]
@@ -76,7 +76,7 @@ def _duel_outcome(duel: Duel) -> str:
     return "not told apart" if winner is None else "better" if winner == duel.subject else "worse"
 
 
-def tally_table(cells: Sequence[Cell], algorithms: Sequence[str]) -> Table:
+def tally_table(cells: Sequence[ProblemAnalysis], algorithms: Sequence[str]) -> Table:
     """On how many problems an algorithm (row) is better and worse than another (column)."""
     won: dict[tuple[str, str], int] = {}
     for duel in (duel for cell in cells for duel in cell.all_duels):
@@ -140,7 +140,7 @@ class Origin:
     settings: str
 
 
-def count_sentence(results: ResultSet, cells: Sequence[Cell]) -> str:
+def count_sentence(results: ResultSet, cells: Sequence[ProblemAnalysis]) -> str:
     """What was compared, and what of it failed or is missing."""
     trials = results.trials
     problems, sizes = trials["problem"].nunique(), trials["swarm_size"].nunique()
@@ -160,7 +160,7 @@ def count_sentence(results: ResultSet, cells: Sequence[Cell]) -> str:
 MAX_NAMED_PROBLEMS = 6  # of which the headline names the winners one by one
 
 
-def headline(cells: Sequence[Cell], within: CriticalDifference, over: CriticalDifference) -> tuple[str, str]:
+def headline(cells: Sequence[ProblemAnalysis], within: CriticalDifference, over: CriticalDifference) -> tuple[str, str]:
     """Who has the best average rank on these problems, whom it beats and with whom it ties; then who beats whom, on
     each problem where they are few; and what holds for problems of this kind. within: from the paired runs. over: from
     the medians of the problems. Where the runs are too few for a test over all problems together, each problem has its
@@ -188,7 +188,7 @@ def headline(cells: Sequence[Cell], within: CriticalDifference, over: CriticalDi
     return first, " ".join(filter(None, [*parts, _generalisation(over)]))
 
 
-def _count_wins(best: str, subject: str, cells: Sequence[Cell]) -> str:
+def _count_wins(best: str, subject: str, cells: Sequence[ProblemAnalysis]) -> str:
     """On how many problems each other one is beaten, by the tests of each problem. subject: the best, in words."""
     if all(cell.ranking.has_too_few_blocks for cell in cells):
         least = min(cell.ranking.blocks for cell in cells)
@@ -208,7 +208,7 @@ def _wins_and_ties(best: str, found: CriticalDifference) -> str:
     return " and ".join(parts)
 
 
-def _winners_on(cell: Cell) -> str:
+def _winners_on(cell: ProblemAnalysis) -> str:
     """Who beats whom on one problem."""
     found = cell.ranking
     if found.has_too_few_blocks:
@@ -258,7 +258,7 @@ def join_words(names: Sequence[str]) -> str:
     return f"{', '.join(others)} and {last}" if others else last
 
 
-def ranking_text(within: CriticalDifference, cells: Sequence[Cell]) -> str:
+def ranking_text(within: CriticalDifference, cells: Sequence[ProblemAnalysis]) -> str:
     """How the ranks of paired runs were compared."""
     noun = "problem" if len({cell.problem for cell in cells}) == len(cells) else "setting"
     problems = "" if len(cells) == 1 else f" of {len(cells)} {noun}s"
@@ -283,7 +283,7 @@ def generalisation_text(over: CriticalDifference) -> str:
     return f"{text} So few problems cannot tell any pair apart." if over.has_too_few_blocks else text
 
 
-def rating_part(cells: Sequence[Cell]) -> TextAndTable:
+def rating_part(cells: Sequence[ProblemAnalysis]) -> TextAndTable:
     """Ratings for fixed budgets and for fixed targets, with intervals; best at the whole budget first."""
     views = [
         (f"{share:.0%} of the budget", [cell.fixed_budget[k] for cell in cells])
@@ -312,7 +312,7 @@ def _rating_cell(rating: Rating | None) -> str:
     return "–" if rating is None else f"{rating.value:.0f} ({rating.low:.0f} – {rating.high:.0f})"
 
 
-def power_part(cells: Sequence[Cell]) -> TextAndTable:
+def power_part(cells: Sequence[ProblemAnalysis]) -> TextAndTable:
     """The effects that the paired test can detect with this number of repetitions."""
     repetitions = min(cell.repetitions for cell in cells)
     count = max(len(cells[0].all_duels), 1)

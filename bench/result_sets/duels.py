@@ -13,7 +13,7 @@ from bench.files import file_name
 from bench.printed import display_name
 from bench.result_sets.formats import make_folder, read_results
 from bench.statistics.power import power_text
-from bench.studies.beyond_paper.report import subject_duels_table
+from bench.studies.beyond_paper.beyond_paper_page import subject_duels_table
 from bench.tables import CELL_COLUMNS, as_csv
 
 _READING = """\

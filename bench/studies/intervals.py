@@ -13,10 +13,10 @@ from bench.result_sets.duels import duels_page
 from bench.rivals import rivals_page
 from bench.statistics.pairwise import Duel
 from bench.statistics.superiority import superiority_interval
-from bench.studies.beyond_paper.figures import draw_ingredients
-from bench.studies.beyond_paper.report import effects_markdown
-from bench.studies.beyond_paper.study import VARIANTS_EXPERIMENT
-from bench.studies.search_space.study import comparison_markdown
+from bench.studies.beyond_paper.beyond_paper_figures import draw_ingredients
+from bench.studies.beyond_paper.beyond_paper_page import effects_markdown
+from bench.studies.beyond_paper.beyond_paper_study import VARIANTS_EXPERIMENT
+from bench.studies.search_space.search_space_study import comparison_markdown
 from bench.studies.tuning.judged import ALL_TUNED, duels_by_rival
 from bench.tables import as_csv
 

@@ -8,13 +8,12 @@ import pytest
 from refusals import refusal
 from scipy.stats import spearmanr
 
+import bench.studies.does_it_help.help_study as study
 import bench.studies.does_it_help.judgement as judgement
-import bench.studies.does_it_help.study as study
 import bench.studies.does_it_help.trajectories as trajectories
 from armlab.common.arrays import Array
 from armlab.common.statistics import spearman_correlations
 from bench.studies.best_known.records import RECORDS_FILE, read_records
-from bench.studies.does_it_help.identification import NOISE_KINDS, MeasurementNoise, identification_errors
 from bench.studies.does_it_help.judgement import (
     CRITERIA,
     ERRORS,
@@ -25,6 +24,7 @@ from bench.studies.does_it_help.judgement import (
     criterion_values,
     group_resample,
 )
+from bench.studies.does_it_help.noisy_identification import NOISE_KINDS, MeasurementNoise, identification_errors
 from bench.studies.does_it_help.trajectories import PROBLEM_SETTINGS, make_specimens, random_feasible
 from problem.excitation import ExcitationProblem
 from problem.registry import parse_problem

@@ -6,7 +6,7 @@ import pytest
 
 from armlab.common.errors import InputError
 from bench.studies.scale.kills import KillResult, Victim, kill_repeatedly
-from bench.studies.scale.report import kills_page, scale_page
+from bench.studies.scale.scale_page import kills_page, scale_page
 from bench.studies.scale.sweeps import ScaleCost, SweepCost, WatchedCommand, watch_command, write_sized_config
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -14,10 +14,11 @@ import pytest
 from algorithms.registry import names_with_derivatives
 from armlab.common.errors import InputError
 from bench.errors import StoppedError
-from bench.studies.landscape import measure, standing, study
+from bench.studies.landscape import landscape_study, measure, standing
 from bench.studies.landscape.basins import Ends, find_symmetry
 from bench.studies.landscape.curvature import curvature_of, measure_curvature
 from bench.studies.landscape.features import Effort
+from bench.studies.landscape.landscape_study import LandscapeOptions, make_landscape
 from bench.studies.landscape.ratios import mean_ratio, quartile_ratio
 from bench.studies.landscape.sampling import (
     SamplingSettings,
@@ -28,7 +29,6 @@ from bench.studies.landscape.sampling import (
     walk_correlation,
 )
 from bench.studies.landscape.standing import BETTER, CANNOT_TELL, FEATURES, WORSE, correlation_table, standings
-from bench.studies.landscape.study import LandscapeOptions, make_landscape
 from problem.registry import parse_problem
 
 ROOT = Path(__file__).parents[2]
@@ -285,7 +285,7 @@ def test_the_committed_pages_have_a_held_out_answer_for_every_algorithm() -> Non
 def test_rows_that_ask_for_derivatives_answer_for_them(
     tmp_path: Path, few_permutations: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(study, "draw_landscape", lambda *tables: {})
+    monkeypatch.setattr(landscape_study, "draw_landscape", lambda *tables: {})
     options = committed(tmp_path)
     results = tmp_path / "results"
     for path in (ROOT / "results").rglob("*"):

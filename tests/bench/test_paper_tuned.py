@@ -10,7 +10,7 @@ from armlab.common.errors import InputError
 from bench.printed import read_printed
 from bench.studies.paper.tuned import TunedEvidence, read_tuned_evidence, tuned_section
 from bench.studies.tuning.judged import TUNED, JudgedRuns, count_wins, ends_table
-from bench.studies.tuning.settings import TuningSettings, read_tuning
+from bench.studies.tuning.tuning_settings import TuningSettings, read_tuning
 
 ROOT = Path(__file__).parents[2]
 SIX = ("mupso", "spso", "woa", "gwo", "goa", "de")

@@ -1,6 +1,6 @@
 """The replication report as a page."""
 
-from bench.studies.paper.report import markdown_to_html
+from bench.studies.paper.replication_page import markdown_to_html
 
 
 def test_tables_of_the_replication_page_bear_their_headings_on_a_phone() -> None:

@@ -11,7 +11,7 @@ import pytest
 from small_results import CONFIG, Ran, ran
 
 from armlab.common.report.palette import series_style
-from bench.report.analysis import Cell, analyse_cell, analyse_cells, losses_by_problem
+from bench.report.analysis import ProblemAnalysis, analyse_cell, analyse_cells, losses_by_problem
 from bench.report.page import page_data, report_page, write_report
 from bench.report.ranking_chart import draw_critical_difference
 from bench.report.sections import ends_table, format_number, headline, rating_part, tally_table
@@ -32,7 +32,7 @@ def results(small_run: Ran) -> ResultSet:
 
 
 @pytest.fixture
-def cell() -> Cell:
+def cell() -> ProblemAnalysis:
     """Two repetitions of two algorithms, one of which finds nothing feasible once."""
     trials = pd.DataFrame(
         {
@@ -84,7 +84,7 @@ def test_labels_of_a_third_party_cannot_break_out_of_the_page(small_run: Ran, tm
     assert page.count("</script>") == 2
 
 
-def test_quartiles_of_convergence_count_an_infeasible_value_as_infinite(cell: Cell) -> None:
+def test_quartiles_of_convergence_count_an_infeasible_value_as_infinite(cell: ProblemAnalysis) -> None:
     assert cell.moments.tolist()[0] == 10
     lower, middle, upper = cell.progress["b"].quartiles
     assert (middle[0], upper[-1]) == (np.inf, np.inf)
@@ -92,13 +92,13 @@ def test_quartiles_of_convergence_count_an_infeasible_value_as_infinite(cell: Ce
     assert (lower[-1], middle[-1], upper[-1]) == (12.5, 15.0, 17.5)
 
 
-def test_targets_go_from_the_worst_first_feasible_value_to_the_best_of_all(cell: Cell) -> None:
+def test_targets_go_from_the_worst_first_feasible_value_to_the_best_of_all(cell: ProblemAnalysis) -> None:
     assert cell.targets[[0, -1]].tolist() == pytest.approx([100.0, 5.0])
     assert cell.progress["a"].expected[[0, -1]].tolist() == [10.0, np.inf]
     assert cell.progress["b"].expected[[0, -1]].tolist() == [30.0, 40.0]
 
 
-def test_runs_are_compared_at_shares_of_the_budget_and_by_their_times_to_targets(cell: Cell) -> None:
+def test_runs_are_compared_at_shares_of_the_budget_and_by_their_times_to_targets(cell: ProblemAnalysis) -> None:
     tenth, third, whole = cell.fixed_budget
     assert tenth.to_numpy().tolist() == third.to_numpy().tolist() == [[np.inf, np.inf]] * 2  # before the first value
     assert whole.to_dict("list") == {"a": [10.0, 20.0], "b": [5.0, np.inf]}
@@ -151,7 +151,7 @@ def test_runs_too_few_for_a_test_over_all_problems_leave_what_each_problem_says(
     trials = pd.DataFrame({"repetition": range(6), "value": np.arange(1.0, 7.0), "violation": 0.0, "seconds": 1.0})
     one = pd.concat([trials.assign(algorithm="a"), trials.assign(algorithm="b", value=trials["value"] + 10)])
     cells = [
-        Cell(
+        ProblemAnalysis(
             f"p{k}",
             one.assign(problem=f"p{k}", swarm_size=5, budget=50),
             np.zeros(1),
@@ -180,7 +180,7 @@ def test_swarm_sizes_of_one_problem_are_settings_and_no_problems(tmp_path: Path)
     assert "Average ranks of the medians of 2 problems" in page
 
 
-def test_two_algorithms_on_one_problem_have_a_winner(cell: Cell) -> None:
+def test_two_algorithms_on_one_problem_have_a_winner(cell: ProblemAnalysis) -> None:
     base = np.random.default_rng(0).normal(size=30)
     found = paired_ranking([pd.DataFrame({"a": base, "b": base + 0.1})])
     first, second = headline([cell], found, found)
@@ -214,7 +214,7 @@ def test_the_picture_has_a_dot_an_algorithm_and_a_bar_a_group_and_says_so_in_wor
     assert "Not told apart: b and c" in picture or "Not told apart: c and b" in picture
 
 
-def test_the_headline_says_who_beats_whom_and_who_ties(cell: Cell) -> None:
+def test_the_headline_says_who_beats_whom_and_who_ties(cell: ProblemAnalysis) -> None:
     rng = np.random.default_rng(0)
     base = rng.normal(size=20)
     losses = pd.DataFrame({"b": base + 5, "a": base, "c": base + 5 + rng.normal(scale=0.1, size=20)})
@@ -224,7 +224,7 @@ def test_the_headline_says_who_beats_whom_and_who_ties(cell: Cell) -> None:
     assert second == "1 of 3 pairs tie: no difference was shown."
 
 
-def test_the_headline_names_all_that_share_the_best_rank(cell: Cell) -> None:
+def test_the_headline_names_all_that_share_the_best_rank(cell: ProblemAnalysis) -> None:
     base = np.arange(20.0)
     turns = np.where(np.arange(20) % 2, 0.5, -0.5)
     found = paired_ranking([pd.DataFrame({"a": base, "b": base + turns, "c": base + 5})])
@@ -258,7 +258,7 @@ def test_the_tally_counts_problems_won_and_lost_on_both_sides(results: ResultSet
     assert sorted(scores) == sorted((lost, won) for won, lost in scores)
 
 
-def test_the_table_of_ends_has_medians_intervals_and_expected_running_times(cell: Cell) -> None:
+def test_the_table_of_ends_has_medians_intervals_and_expected_running_times(cell: ProblemAnalysis) -> None:
     table = ends_table(cell)
     assert table.rows[0][1] == "15 (10 – 20)"
     assert table.rows[1][4] == "50%"

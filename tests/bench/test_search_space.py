@@ -15,7 +15,7 @@ from armlab.common.errors import InputError
 from bench.run import RunOptions
 from bench.studies.best_known.records import known_values, read_records
 from bench.studies.search_space import loss
-from bench.studies.search_space.study import comparison_table, make_search_space, pair_problems
+from bench.studies.search_space.search_space_study import comparison_table, make_search_space, pair_problems
 from problem.registry import parse_problem
 
 ROOT = Path(__file__).parents[2]

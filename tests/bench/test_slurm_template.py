@@ -10,7 +10,7 @@ from pathlib import Path
 from bench.run import load_experiment
 from bench.store import open_store
 from bench.studies.scale.cluster import simulate_clusters
-from bench.studies.scale.report import cluster_page
+from bench.studies.scale.scale_page import cluster_page
 
 ROOT = Path(__file__).parents[2]
 CONFIG = """\

@@ -14,7 +14,7 @@ from bench.studies.speed.evaluations import (
     random_motions,
     with_joint_frames,
 )
-from bench.studies.speed.report import speed_page
+from bench.studies.speed.speed_page import speed_page
 from problem.base_parameters import base_parameters
 from problem.regressor import gram_matrix, rigid_body_torque
 from problem.robot_file import load_arm

@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 from bench.run import RunOptions
-from bench.studies.beyond_paper.report import effect_table, median_table, variant_duels_table
-from bench.studies.beyond_paper.study import EXPERIMENTS, describe_study, make_study
+from bench.studies.beyond_paper.beyond_paper_page import effect_table, median_table, variant_duels_table
+from bench.studies.beyond_paper.beyond_paper_study import EXPERIMENTS, describe_study, make_study
 
 ROOT = Path(__file__).parents[2]
 SMALLER = {

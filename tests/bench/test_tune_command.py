@@ -11,10 +11,10 @@ import pytest
 import yaml
 from refusals import refusal
 
-from bench.studies.tuning import search
-from bench.studies.tuning.search import INFEASIBLE_LOSS, relative_loss
-from bench.studies.tuning.settings import read_tuning
-from bench.studies.tuning.study import TuningOptions, tune_algorithms
+from bench.studies.tuning import parameter_search
+from bench.studies.tuning.parameter_search import INFEASIBLE_LOSS, relative_loss
+from bench.studies.tuning.tuning_settings import read_tuning
+from bench.studies.tuning.tuning_study import TuningOptions, tune_algorithms
 
 ROOT = Path(__file__).parents[2]
 SMALL: dict[str, Any] = {
@@ -135,7 +135,7 @@ def test_each_mistake_is_told_in_one_line(config: Callable[..., Path], tmp_path:
 def test_the_projects_own_configuration_is_right_and_every_range_holds_the_published_value() -> None:
     settings = read_tuning(ROOT / "configs" / "tune.yaml")
     for name, ranges in settings.algorithms.items():
-        assert set(search._published_params(name, ranges)) == set(ranges)
+        assert set(parameter_search._published_params(name, ranges)) == set(ranges)
 
 
 def test_results_of_other_settings_stay(config: Callable[..., Path], tmp_path: Path) -> None:

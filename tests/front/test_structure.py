@@ -16,6 +16,9 @@ def test_no_class_name_and_no_file_name_stands_twice_in_a_package() -> None:
 
 
 def test_a_name_is_found_where_it_stands_twice() -> None:
+    study, other_study = Path("bench/studies/a/study.py"), Path("bench/studies/b/study.py")
+    assert names_twice({study: ast.parse(""), other_study: ast.parse("")}) == {"bench: study.py": [study, other_study]}
+
     one, other = Path("armlab/proof/a/page.py"), Path("armlab/proof/b/page.py")
     elsewhere = Path("armlab/report/plan.py")
     trees = {one: ast.parse("class Plan: ..."), other: ast.parse(""), elsewhere: ast.parse("class Plan: ...")}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from armlab.common.arrays import Array
 from armlab.common.statistics import spearman_correlations
 from armlab.common.streams import named_generator
-from bench.studies.does_it_help.identification import NOISE_KINDS, identification_errors
+from bench.studies.does_it_help.noisy_identification import NOISE_KINDS, identification_errors
 from bench.studies.does_it_help.trajectories import Specimen, random_feasible
 from problem.excitation import ExcitationProblem
 from problem.fitness import Criterion

@@ -11,8 +11,8 @@ from algorithms.sqp import SPSOThenSQPParams
 from armlab.common.markdown import markdown_table
 from bench.printed import display_name
 from bench.studies.landscape.ratios import Ratio, mean_ratio, quartile_ratio_text
-from bench.studies.landscape.sources import Comparison, Sources
-from bench.studies.search_space.study import FEASIBLE_MARK
+from bench.studies.landscape.sources import Sources, SummaryTable
+from bench.studies.search_space.search_space_study import FEASIBLE_MARK
 from bench.studies.tuning.judged import TUNED
 
 _BUDGET_HEADINGS = ["problem", "evaluations", "least median", "next", "next to least"]
@@ -119,7 +119,7 @@ def _time_rows(sources: Sources) -> Iterator[_TimeRow]:
         yield _TimeRow(problem, budget, work, _median_text(group, asking), nearest, _median_text(rival, best), ratio)
 
 
-def _budget_groups(compared: Comparison) -> Iterator[tuple[str, int, pd.DataFrame]]:
+def _budget_groups(compared: SummaryTable) -> Iterator[tuple[str, int, pd.DataFrame]]:
     """Problem, budget, and the rows by algorithm, the least median first."""
     for names, group in compared.with_budgets().groupby(["problem", "budget"], sort=False):
         problem, budget = np.atleast_1d(np.array(names, dtype=object))

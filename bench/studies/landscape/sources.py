@@ -19,19 +19,19 @@ from bench.studies.landscape.standing import standings
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class SummaryTable:
     """A summary table and the settings that it was made with."""
 
     table: pd.DataFrame
     settings: dict[str, Any]
 
     @staticmethod
-    def read(folder: Path, name: str) -> "Comparison":
+    def read(folder: Path, name: str) -> "SummaryTable":
         """Raises InputError where one of the two files is missing."""
         path = folder / f"{name}.csv"
         if not path.is_file():
             raise InputError(f"{path}: there are no such results; `armlab run` or its study makes them")
-        return Comparison(pd.read_csv(path), read_yaml(settings_path(folder, name)))
+        return SummaryTable(pd.read_csv(path), read_yaml(settings_path(folder, name)))
 
     @property
     def repetitions(self) -> int:
@@ -43,17 +43,17 @@ class Comparison:
         """In the order of the table."""
         return [str(name) for name in self.table["algorithm"].unique()]
 
-    def only(self, algorithms: Sequence[str]) -> "Comparison":
+    def only(self, algorithms: Sequence[str]) -> "SummaryTable":
         """The rows of some algorithms."""
-        return Comparison(self.table[self.table["algorithm"].isin(algorithms)], self.settings)
+        return SummaryTable(self.table[self.table["algorithm"].isin(algorithms)], self.settings)
 
     def medians(self, algorithm: str) -> "pd.Series[float]":
         """By problem; infinite where most ends are infeasible."""
         return self.table[self.table["algorithm"] == algorithm].set_index("problem")["median"]
 
-    def of_problems(self, problems: Sequence[str]) -> "Comparison":
+    def of_problems(self, problems: Sequence[str]) -> "SummaryTable":
         """The rows of some problems."""
-        return Comparison(self.table[self.table["problem"].isin(problems)], self.settings)
+        return SummaryTable(self.table[self.table["problem"].isin(problems)], self.settings)
 
     def average_ranks(self) -> "pd.Series[float]":
         """Least first."""
@@ -82,13 +82,13 @@ class Sources:
     prices: of a point with derivatives by problem, `stated` as budgets count it, and `in_population` as its time does.
     """
 
-    suite: Comparison
-    held_out: Comparison
-    readings: Comparison
-    derivatives: Comparison
-    derivative_budgets: Comparison
-    budgets: Comparison
-    space: Comparison
+    suite: SummaryTable
+    held_out: SummaryTable
+    readings: SummaryTable
+    derivatives: SummaryTable
+    derivative_budgets: SummaryTable
+    budgets: SummaryTable
+    space: SummaryTable
     space_duels: pd.DataFrame
     tuned: pd.DataFrame
     prices: dict[str, dict[str, float]]
@@ -103,13 +103,13 @@ class Sources:
                 target = path.parent.name.replace("_", "-")
                 raise InputError(f"{path}: there are no such results; `make {target}` makes them")
         return Sources(
-            suite=Comparison.read(results / "suite", "suite"),
-            held_out=Comparison.read(results / "suite", "suite_heldout"),
-            readings=Comparison.read(results / "suite", "suite_readings"),
-            derivatives=Comparison.read(results / "derivatives", "derivatives"),
-            derivative_budgets=Comparison.read(results / "derivatives", "derivatives_budgets"),
-            budgets=Comparison.read(results / "study", "study_budgets"),
-            space=Comparison.read(results / "search_space", "search_space"),
+            suite=SummaryTable.read(results / "suite", "suite"),
+            held_out=SummaryTable.read(results / "suite", "suite_heldout"),
+            readings=SummaryTable.read(results / "suite", "suite_readings"),
+            derivatives=SummaryTable.read(results / "derivatives", "derivatives"),
+            derivative_budgets=SummaryTable.read(results / "derivatives", "derivatives_budgets"),
+            budgets=SummaryTable.read(results / "study", "study_budgets"),
+            space=SummaryTable.read(results / "search_space", "search_space"),
             space_duels=pd.read_csv(results / "search_space" / "comparison.csv"),
             tuned=pd.read_csv(results / "tune" / "tune_judged.csv").set_index("algorithm"),
             prices=_read_prices(results / "speed" / "speed.json"),
@@ -142,6 +142,6 @@ class Sources:
         """The same of those that ask for derivatives; None where the suite has none."""
         return str(self.suite.only(self.asking).average_ranks().index[0]) if self.asking else None
 
-    def ratio(self, comparison: Comparison, ours: str, theirs: str) -> Ratio:
+    def ratio(self, comparison: SummaryTable, ours: str, theirs: str) -> Ratio:
         """Of the medians of two algorithms over the problems of a comparison."""
         return mean_ratio(comparison.medians(ours), comparison.medians(theirs), self.groups)

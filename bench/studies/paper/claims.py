@@ -9,10 +9,10 @@ import pandas as pd
 from algorithms.parameter_types import OURS
 from bench.printed import Printed
 from bench.studies.mutations import MutationHistory
-from bench.studies.paper.identification import BestRun, SimulatedIdentification
 from bench.studies.paper.literal import LITERAL_READINGS, Identifiability, Reading, identifiability, literal_matrix
-from bench.studies.paper.published import PublishedReading
+from bench.studies.paper.published_coefficients import PublishedReading
 from bench.studies.paper.ranking import Standing
+from bench.studies.paper.simulated_identification import BestRun, SimulatedIdentification
 from bench.tables import summary_table, times_table
 
 Verdict = Literal["reproduced", "not reproduced", "cannot be checked"]

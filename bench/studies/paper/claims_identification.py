@@ -9,7 +9,7 @@ from armlab.common.arrays import Array
 from bench.printed import PrintedCounts
 from bench.studies.paper.claims import Claim, Evidence, is_close_to_printed, verdict_if
 from bench.studies.paper.literal import Identifiability, Reading
-from bench.studies.paper.tables import listed_parameters
+from bench.studies.paper.paper_tables import listed_parameters
 
 _MISSING_CONVENTIONS = (
     "missing: the fundamental frequency, the number of samples, the centre of the path, the tool point, and "

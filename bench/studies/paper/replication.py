@@ -16,8 +16,22 @@ from bench.store import open_store
 from bench.studies.best_known.records import best_known_values
 from bench.studies.mutations import MutationHistory, replay_mutations
 from bench.studies.paper.claims import Evidence, literal_readings
-from bench.studies.paper.identification import BestRun, find_best_run, simulate_identification
-from bench.studies.paper.published import published_readings
+from bench.studies.paper.paper_settings import (
+    Figure4Settings,
+    Table1Settings,
+    Table2Settings,
+    Table4Settings,
+    TrajectorySettings,
+    read_settings,
+)
+from bench.studies.paper.paper_tables import (
+    make_table1,
+    make_table2,
+    make_table4,
+    table1_deviations,
+    table2_differences,
+)
+from bench.studies.paper.published_coefficients import published_readings
 from bench.studies.paper.ranking import (
     SUBJECT,
     TWO_PROGRAMS,
@@ -26,15 +40,7 @@ from bench.studies.paper.ranking import (
     ranking_table,
     standings,
 )
-from bench.studies.paper.settings import (
-    Figure4Settings,
-    Table1Settings,
-    Table2Settings,
-    Table4Settings,
-    TrajectorySettings,
-    read_settings,
-)
-from bench.studies.paper.tables import make_table1, make_table2, make_table4, table1_deviations, table2_differences
+from bench.studies.paper.simulated_identification import BestRun, find_best_run, simulate_identification
 from bench.studies.paper.tuned import TunedEvidence, read_tuned_evidence
 from bench.tables import as_csv, tidy_frame
 
@@ -136,7 +142,7 @@ def _make_files(
     items: _ItemSettings, loaded: Mapping[str, LoadedExperiment], evidence: Evidence, records: Path
 ) -> Files:
     from bench.comparison_figures import draw_ends, draw_ranking
-    from bench.studies.paper.figures import draw_figure4, draw_figure5
+    from bench.studies.paper.trajectory_figures import draw_figure4, draw_figure5
 
     known = best_known_values(loaded["table3"].entries, records)
     usable = [standing.problem for standing in evidence.ranking if standing.usable]
@@ -167,7 +173,7 @@ def _settings_files(items: _ItemSettings) -> Files:
 
 
 def _report_files(evidence: Evidence, tuned: TunedEvidence, folder: Path) -> Files:
-    from bench.studies.paper.report import FIGURE_CAPTIONS, markdown_to_html, replication_page
+    from bench.studies.paper.replication_page import FIGURE_CAPTIONS, markdown_to_html, replication_page
 
     text = replication_page(evidence, tuned)
     images = {name: (folder / name).read_bytes() for name in FIGURE_CAPTIONS}

@@ -15,7 +15,7 @@ from bench.printed import display_name
 from bench.statistics import is_feasible, quantile
 from bench.statistics.critical_difference import CriticalDifference, block_losses, critical_difference
 from bench.statistics.pairwise import Duel, duel_row, duels, log_losses
-from bench.studies.tuning.settings import TuningSettings, read_tuning
+from bench.studies.tuning.tuning_settings import TuningSettings, read_tuning
 from bench.tables import GROUP_COLUMNS
 
 TUNED = " tuned"

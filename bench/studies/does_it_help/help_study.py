@@ -8,8 +8,8 @@ from joblib import Parallel, delayed
 
 from armlab.common.files import write_whole
 from bench.studies.best_known.records import RECORDS_FILE, read_records
+from bench.studies.does_it_help.help_page import draw_correlations, draw_errors, study_page
 from bench.studies.does_it_help.judgement import SUBSETS, Jury, choose_jury, correlation_table, judge_specimen
-from bench.studies.does_it_help.report import draw_correlations, draw_errors, study_page
 from bench.studies.does_it_help.trajectories import Specimen, make_specimens, unit_column_specimens
 from bench.tables import as_csv
 

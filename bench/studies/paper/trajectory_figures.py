@@ -11,8 +11,8 @@ from armlab.common.arrays import Array
 from armlab.common.report import palette
 from bench.figures import line_style, render_figure
 from bench.printed import display_name
-from bench.studies.paper.identification import BestRun
-from bench.studies.paper.settings import Figure4Settings, TrajectorySettings
+from bench.studies.paper.paper_settings import Figure4Settings, TrajectorySettings
+from bench.studies.paper.simulated_identification import BestRun
 from problem.arm import Limits, body_points
 from problem.trajectories import sample_instants
 

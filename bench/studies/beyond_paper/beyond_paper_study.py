@@ -11,7 +11,7 @@ from bench.plan import Plan
 from bench.run import LoadedExperiment, ProgressBar, RunOptions, describe_run, load_experiment, run_experiment
 from bench.store import open_store
 from bench.studies.best_known.records import best_known_values
-from bench.studies.beyond_paper.report import (
+from bench.studies.beyond_paper.beyond_paper_page import (
     StudyPart,
     effect_table,
     median_table,
@@ -69,7 +69,7 @@ def _read_outcomes(loaded: Mapping[str, LoadedExperiment], options: RunOptions) 
 
 def _make_files(outcomes: _Outcomes, records: Path, workers: int) -> Files:
     from bench.comparison_figures import draw_budgets
-    from bench.studies.beyond_paper.figures import draw_ingredients, draw_swarm_sizes
+    from bench.studies.beyond_paper.beyond_paper_figures import draw_ingredients, draw_swarm_sizes
 
     frames = outcomes.frames
     duels = {name: _duels_table(name, frame) for name, frame in frames.items()}

@@ -38,7 +38,7 @@ class ParameterRange(Settings):
         return isinstance(self.low, int) and isinstance(self.high, int)
 
 
-class Sweep(Settings):
+class ParameterSweep(Settings):
     """One hyper-parameter of one algorithm at these values, all others as published, on the judging problems."""
 
     algorithm: str
@@ -64,7 +64,7 @@ class TuningSettings(Settings):
     evaluations: Count
     train_seed: Annotated[int, Ge(0)]
     judge_seed: Annotated[int, Ge(0)]
-    sweep: Sweep | None = None
+    sweep: ParameterSweep | None = None
 
     @model_validator(mode="after")
     def _nothing_judges_that_was_trained_on(self) -> Self:

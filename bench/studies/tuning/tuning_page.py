@@ -11,11 +11,11 @@ from bench.printed import display_name
 from bench.statistics.pairwise import Duel
 from bench.statistics.power import power_text
 from bench.studies.tuning.judged import SUBJECT, TUNED, JudgedRuns, ProblemDuels, count_wins, duel_sign, duels_by_rival
-from bench.studies.tuning.search import Tuned, params_text
+from bench.studies.tuning.parameter_search import Tuned, params_text
 
 
 @dataclass(frozen=True, eq=False)
-class Judgement:
+class TuningOutcome:
     """What tuning found for each algorithm, and its judged runs; known: best condition numbers by problem."""
 
     tuned: tuple[Tuned, ...]
@@ -46,7 +46,7 @@ first as published, then as tuned (Holm over all values and rivals within a prob
 medians of the others. The limit is read off the problems that judge it, so a win here is an upper bound."""
 
 
-def tuning_page(judged: Judgement) -> str:
+def tuning_page(judged: TuningOutcome) -> str:
     """The tables and their verdict as a Markdown page."""
     settings = judged.runs.settings
     effort = (
@@ -68,7 +68,7 @@ def tuning_page(judged: Judgement) -> str:
     return markdown_page(settings.name, _READING, effort, *sections)
 
 
-def _found_rows(judged: Judgement) -> Iterator[list[str]]:
+def _found_rows(judged: TuningOutcome) -> Iterator[list[str]]:
     for one in judged.tuned:
         losses = sorted(tried.loss for tried in one.configurations)
         place = losses.index(one.configurations[0].loss) + 1
@@ -83,7 +83,7 @@ def _found_rows(judged: Judgement) -> Iterator[list[str]]:
         ]
 
 
-def _medians_table(judged: Judgement) -> str:
+def _medians_table(judged: TuningOutcome) -> str:
     runs = judged.runs
     table, signs = runs.medians(), _signs(runs.tuning_duels())
     rows = []

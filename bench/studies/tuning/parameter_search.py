@@ -25,7 +25,7 @@ from bench.plan import Plan, plan_trials
 from bench.run import run_missing
 from bench.store import RunStore
 from bench.studies.tuning.judged import median_ends
-from bench.studies.tuning.settings import ParameterRange, TuningSettings
+from bench.studies.tuning.tuning_settings import ParameterRange, TuningSettings
 from bench.tables import tidy_frame
 
 INFEASIBLE_LOSS = 1.0  # log10 of ten times the published median

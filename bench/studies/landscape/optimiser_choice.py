@@ -20,7 +20,7 @@ from bench.studies.landscape.choice_studies import (
     tuning_sentence,
 )
 from bench.studies.landscape.ratios import Ratio, mean_ratio, quartile_ratio_text
-from bench.studies.landscape.sources import Comparison, Sources
+from bench.studies.landscape.sources import Sources, SummaryTable
 from bench.studies.landscape.standing import BETTER, CANNOT_TELL, FEATURES, POWER, standings
 
 FORMS = {"tool": "path of the tool point", "joint": "periodic series", "rest": "series from rest to rest"}
@@ -82,7 +82,7 @@ def _names(algorithms: Sequence[str]) -> str:
     return ", ".join(map(_name, algorithms)) or "none"
 
 
-def _evaluations(comparison: Comparison) -> str:
+def _evaluations(comparison: SummaryTable) -> str:
     sizes, iterations = (np.atleast_1d(comparison.settings[key]) for key in ("swarm_size", "iterations"))
     return " or ".join(f"{count:,}" for count in np.outer(sizes, iterations + 1).ravel())
 
@@ -162,7 +162,7 @@ def _reading_name(label: str) -> str:
 def _readings_section(sources: Sources) -> Iterator[str]:
     """What other readings of the algorithms change on suite 1."""
     both = pd.concat([sources.suite.only(sources.plain).table, sources.readings.table])
-    ranks = Comparison(both, sources.suite.settings).average_ranks()
+    ranks = SummaryTable(both, sources.suite.settings).average_ranks()
     yield "## Other readings of the algorithms"
     yield (
         "The rows above are of the algorithms as read here. A source's text as printed and its authors' program are "
@@ -229,7 +229,7 @@ def _asking_section(sources: Sources) -> Iterator[str]:
     yield markdown_table(headings, [[_name(name), *each] for name, each in cells.items()], range(1, len(headings)))
 
 
-def _derivative_winners(compared: Comparison) -> list[tuple[str, pd.DataFrame, str, str]]:
+def _derivative_winners(compared: SummaryTable) -> list[tuple[str, pd.DataFrame, str, str]]:
     """By problem: its rows by algorithm, and the least medians without and with derivatives."""
     groups = [(str(name), rows.set_index("algorithm")) for name, rows in compared.table.groupby("problem", sort=False)]
     return [
@@ -238,7 +238,7 @@ def _derivative_winners(compared: Comparison) -> list[tuple[str, pd.DataFrame, s
     ]
 
 
-def _kinds(sources: Sources) -> Iterator[tuple[str, Comparison, Comparison]]:
+def _kinds(sources: Sources) -> Iterator[tuple[str, SummaryTable, SummaryTable]]:
     """Kinds of problems: form of the trajectory and joints, with the rows of both suites."""
     for (form, joints), rows in sources.features.groupby(["form", "joints"], sort=False):
         problems = list(rows["problem"])
@@ -246,7 +246,7 @@ def _kinds(sources: Sources) -> Iterator[tuple[str, Comparison, Comparison]]:
         yield label, sources.suite.of_problems(problems), sources.held_out.of_problems(problems)
 
 
-def _kind_winner(comparison: Comparison) -> str:
+def _kind_winner(comparison: SummaryTable) -> str:
     return str(comparison.average_ranks().index[0])
 
 

@@ -9,15 +9,6 @@ from matplotlib.axes import Axes
 
 from armlab.common.markdown import markdown_table
 from bench.figures import BITMAP, line_style, render_panels
-from bench.studies.does_it_help.identification import (
-    COULOMB_FRICTION,
-    ENCODER_COUNTS,
-    FILTER_CUTOFF_HZ,
-    NOISE_KINDS,
-    RATE_HZ,
-    TORQUE_NOISE,
-    TORQUE_SHARE,
-)
 from bench.studies.does_it_help.judgement import (
     CRITERIA,
     ERRORS,
@@ -26,6 +17,15 @@ from bench.studies.does_it_help.judgement import (
     SUBSETS,
     correlation_ceiling,
     split_subsets,
+)
+from bench.studies.does_it_help.noisy_identification import (
+    COULOMB_FRICTION,
+    ENCODER_COUNTS,
+    FILTER_CUTOFF_HZ,
+    NOISE_KINDS,
+    RATE_HZ,
+    TORQUE_NOISE,
+    TORQUE_SHARE,
 )
 
 KIND_NAMES = {

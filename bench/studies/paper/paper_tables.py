@@ -13,8 +13,8 @@ from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.settings import read_yaml, validate
 from bench.plan import Entry
 from bench.printed import Printed, PrintedJoint, display_name, times_pi
-from bench.studies.paper.identification import BestRun, SimulatedIdentification
-from bench.studies.paper.settings import Table1Settings, Table2Settings, Table4Settings
+from bench.studies.paper.paper_settings import Table1Settings, Table2Settings, Table4Settings
+from bench.studies.paper.simulated_identification import BestRun, SimulatedIdentification
 from bench.tables import as_csv
 from problem.arm import PARAMETER_NAMES, PARAMETER_UNITS
 from problem.base_parameters import BaseParameters

@@ -13,9 +13,9 @@ from bench.run import ProgressBar
 from bench.store import open_store
 from bench.studies.best_known.records import best_known_values
 from bench.studies.tuning.judged import TUNED, JudgedRuns, ends_path, ends_table, sweep_label
-from bench.studies.tuning.report import Judgement, configurations_table, tuning_page
-from bench.studies.tuning.search import Tuned, run_frame, tune_algorithm
-from bench.studies.tuning.settings import TuningSettings, read_tuning
+from bench.studies.tuning.parameter_search import Tuned, run_frame, tune_algorithm
+from bench.studies.tuning.tuning_page import TuningOutcome, configurations_table, tuning_page
+from bench.studies.tuning.tuning_settings import TuningSettings, read_tuning
 from bench.tables import as_csv
 
 
@@ -59,7 +59,7 @@ def tune_algorithms(path: Path, options: TuningOptions, bar: ProgressBar) -> Ite
         ends_path(options.results, settings.name).name: as_csv(ends_table(frame)),
         f"{settings.name}_duels.csv": as_csv(runs.duels_table()),
         **{f"{settings.name}_ranking.{suffix}": image for suffix, image in draw_ranking(runs.contest()).items()},
-        f"{settings.name}.md": tuning_page(Judgement(tuple(tuned), runs, known)),
+        f"{settings.name}.md": tuning_page(TuningOutcome(tuple(tuned), runs, known)),
     }
     yield from write_with_settings(options.results, settings.name, files, settings_to_yaml(settings))
 

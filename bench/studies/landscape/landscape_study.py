@@ -12,13 +12,13 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from bench.run import ProgressBar
 from bench.studies.best_known.records import RECORDS_FILE
-from bench.studies.landscape.choice import choice_page
 from bench.studies.landscape.features import Effort
 from bench.studies.landscape.figure import draw_landscape
+from bench.studies.landscape.landscape_page import PICTURE_STEM, landscape_page
 from bench.studies.landscape.measure import ends_table, feature_table, list_work, measure_all
-from bench.studies.landscape.page import PICTURE_STEM, landscape_page
+from bench.studies.landscape.optimiser_choice import choice_page
 from bench.studies.landscape.sampling import SamplingSettings
-from bench.studies.landscape.sources import Comparison, Sources
+from bench.studies.landscape.sources import Sources, SummaryTable
 from bench.studies.landscape.standing import correlation_table, standings
 from bench.tables import as_csv
 
@@ -48,7 +48,7 @@ def make_landscape(options: LandscapeOptions, bar: ProgressBar) -> Iterator[Path
     It can be stopped at any time: what was measured is kept, and the same command goes on from there. Raises
     InputError where results are missing, StoppedError.
     """
-    suites = [Comparison.read(options.results / "suite", name) for name in ("suite", "suite_heldout")]
+    suites = [SummaryTable.read(options.results / "suite", name) for name in ("suite", "suite_heldout")]
     measured = _read_texts(options.out) if options.pages else _measure(suites, options, bar)
     features, ends = (pd.read_csv(StringIO(measured[name])) for name in (FEATURES_FILE, ENDS_FILE))
     first, second = (standings(each.table) for each in suites)
@@ -64,7 +64,7 @@ def make_landscape(options: LandscapeOptions, bar: ProgressBar) -> Iterator[Path
     yield from write_texts(texts, options.out)
 
 
-def _measure(suites: list[Comparison], options: LandscapeOptions, bar: ProgressBar) -> dict[str, str]:
+def _measure(suites: list[SummaryTable], options: LandscapeOptions, bar: ProgressBar) -> dict[str, str]:
     labels = list(dict.fromkeys(str(name) for suite in suites for name in suite.table["problem"]))
     work = list_work(labels, options.effort, options.results / RECORDS_FILE)
     results = measure_all(work, options.effort, options.store, options.workers, bar)

@@ -14,7 +14,7 @@ from armlab.common.streams import named_generator
 from bench.execute import build_problem
 from bench.plan import Entry
 from bench.store import RunStore
-from bench.studies.paper.settings import Table4Settings
+from bench.studies.paper.paper_settings import Table4Settings
 from problem.arm import Arm
 from problem.excitation import ExcitationProblem
 from problem.motion import Motion
