@@ -102,10 +102,6 @@ class HoseHysteresis(OutsideEffect):
         level = torque_share(0.03, machine, joint)
         return cls(joint, level, 8 * level, "frozen", shape)
 
-    @property
-    def joints(self) -> tuple[int, ...]:
-        return (self.joint + 1, int(self.shape["from"]) + 1)
-
     def torque(self, track: Track, run: int) -> Array:
         steps = np.diff(track.position[:, int(self.shape["from"])], prepend=track.position[0, int(self.shape["from"])])
         return self.size * bouc_wen(steps / self.shape["way"])
@@ -134,8 +130,9 @@ class FlexibleBase(OutsideEffect):
         return Parts(mount=Mount(axis, 1 / self.size, 3e-3 / self.size))
 
     @property
-    def place(self) -> None:
-        return None
+    def joints(self) -> tuple[int, ...]:
+        """The first one, which feels it."""
+        return (self.joint + 1,)
 
     def parameters(self) -> ParameterValues:
         return {"compliance": self.size}
@@ -186,10 +183,6 @@ class ProductOfPositions(OutsideEffect):
         shape = {"from": draw_other_joint(rng, machine, joint), "phase": float(rng.uniform(0, 2 * np.pi))}
         level = torque_share(0.03, machine, joint)
         return cls(joint, level, 8 * level, "frozen", shape)
-
-    @property
-    def joints(self) -> tuple[int, ...]:
-        return (self.joint + 1, int(self.shape["from"]) + 1)
 
     def torque(self, track: Track, run: int) -> Array:
         other = np.sin(track.position[:, int(self.shape["from"])] + self.shape["phase"])

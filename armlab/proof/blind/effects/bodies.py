@@ -88,14 +88,6 @@ class Tilt(HiddenEffect):
         return cls(joint, 0.017, 0.2, cls.draw_form(rng), {"direction": float(rng.uniform(0, 2 * np.pi))})
 
     @property
-    def place(self) -> None:
-        return None
-
-    @property
-    def joints(self) -> tuple[int, ...]:
-        return ()
-
-    @property
     def comparable(self) -> tuple[str, ...]:
         """None: a direction needs another measure of error than a number."""
         return ()

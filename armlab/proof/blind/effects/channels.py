@@ -73,14 +73,6 @@ class Delay(HiddenEffect):
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
         return cls(joint, 4e-3, 5e-2, cls.draw_form(rng))
 
-    @property
-    def place(self) -> None:
-        return None
-
-    @property
-    def joints(self) -> tuple[int, ...]:
-        return ()
-
     def parameters(self) -> ParameterValues:
         return {"seconds": self.size}
 

@@ -95,10 +95,6 @@ class Coupling(HiddenEffect):
         coefficient = torque_share(0.02, machine, joint)
         return cls(joint, coefficient, 8 * coefficient, cls.draw_form(rng), shape)
 
-    @property
-    def joints(self) -> tuple[int, ...]:
-        return (self.joint + 1, int(self.shape["from"]) + 1)
-
     def parameters(self) -> ParameterValues:
         inertia = self.size * self.shape["inertia"] if self.form == self.forms[1] else 0.0
         return {"coefficient": self.size, "level": self.size * self.shape["level"], "inertia": inertia}

@@ -73,12 +73,14 @@ class HiddenEffect:
     @property
     def place(self) -> int | None:
         """Joint or link from 1; None for an effect of the whole robot."""
-        return self.joint + 1
+        return None if self.where == "robot" else self.joint + 1
 
     @property
     def joints(self) -> tuple[int, ...]:
-        """Where the torque appears, and where the motion is, from 1."""
-        return (self.joint + 1,)
+        """Where the torque appears, and where the motion is, from 1; none for an effect of the whole robot."""
+        if self.where == "robot":
+            return ()
+        return (self.joint + 1, *([int(self.shape["from"]) + 1] if "from" in self.shape else []))
 
     @property
     def comparable(self) -> tuple[str, ...]:
