@@ -177,11 +177,11 @@ def _places_of_lost_rows(run: MotionRun, joint: int) -> NDArray[np.intp]:
     """Rows after which the position moves by more than a bridged gap of its velocity, which fits it elsewhere."""
     assert run.velocity is not None
     velocity = (run.velocity[1:, joint] + run.velocity[:-1, joint]) / 2
-    told, moved = velocity * np.diff(run.time), np.diff(run.position[:, joint])
+    integrated, moved = velocity * np.diff(run.time), np.diff(run.position[:, joint])
     fast = np.abs(velocity) >= np.sqrt(np.mean(velocity**2))
-    jumps = fast & (np.abs(moved) > MAX_BRIDGED_GAP * np.abs(told))
+    jumps = fast & (np.abs(moved) > MAX_BRIDGED_GAP * np.abs(integrated))
     rest = moved[fast & ~jumps]
-    scale = float(told[fast & ~jumps] @ rest / (rest @ rest)) if rest.any() else 0.0
+    scale = float(integrated[fast & ~jumps] @ rest / (rest @ rest)) if rest.any() else 0.0
     return np.flatnonzero(jumps) if _is_near_one(scale) else np.array([], dtype=np.intp)
 
 

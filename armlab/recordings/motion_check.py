@@ -24,8 +24,8 @@ def check_answers(runs: Sequence[MotionRun], arm: Arm) -> tuple[Finding, ...]:
     """
     commands = np.concatenate([np.asarray(run.reference_position) for run in runs])
     positions = np.concatenate([run.position for run in runs])
-    moved, told = np.ptp(positions, axis=0), np.ptp(commands, axis=0)
-    still = (moved < MIN_MOVED) & (told < MIN_MOVED)
+    moved, commanded = np.ptp(positions, axis=0), np.ptp(commands, axis=0)
+    still = (moved < MIN_MOVED) & (commanded < MIN_MOVED)
     likeness = _correlations(positions, commands)
     found = [_unit_error(commands, positions, likeness, arm, joint) for joint in range(len(moved)) if not still[joint]]
     found += [_exchanged(likeness, arm, joint) for joint in range(len(moved)) if not still[joint]]
@@ -41,8 +41,8 @@ def _correlations(positions: Array, commands: Array) -> Array:
 
 
 def _unit_error(commands: Array, positions: Array, likeness: Array, arm: Arm, joint: int) -> Finding | None:
-    told = commands[:, joint] - commands[:, joint].mean()
-    gain = float(told @ positions[:, joint]) / max(float(told @ told), 1e-300)
+    swing = commands[:, joint] - commands[:, joint].mean()
+    gain = float(swing @ positions[:, joint]) / max(float(swing @ swing), 1e-300)
     if abs(likeness[joint, joint]) < MIN_LIKENESS or 1 / MAX_GAIN < abs(gain) < MAX_GAIN:
         return None
     size = max(abs(gain), 1 / max(abs(gain), 1e-300))

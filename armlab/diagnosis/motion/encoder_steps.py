@@ -38,7 +38,7 @@ def is_made_by_encoder_steps(
     fits = [fit_servo(counted, start, fit.free, tuning.max_evaluations) for start in starts]
     best = min(fits, key=lambda each: each.rms)
     found, made = (to_coordinates(each.values)[number] - to_coordinates(base)[number] for each in (fit, best))
-    return bool(found * made > 0 and held.rms**2 - best.rms**2 > tuning.max_made * taken)
+    return bool(found * made > 0 and held.rms**2 - best.rms**2 > tuning.max_share_of_encoder_steps * taken)
 
 
 def replay_in_steps(windows: Windows, values: Array) -> Windows:

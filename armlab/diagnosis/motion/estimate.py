@@ -195,7 +195,7 @@ def reading_noise(windows: Windows, values: Array) -> float:
 def least_gain(square: float, noise: float, tuning: MotionTuning = DEFAULT) -> float:
     """Share of a mean squared error, rad2, that a number has to take: of what is not the noise of reading, rad."""
     beyond = 1 - noise**2 / max(square, 1e-300)
-    return float(tuning.min_gain * max(beyond, tuning.min_beyond))
+    return float(tuning.min_gain * max(beyond, tuning.min_share_beyond_noise))
 
 
 def price_of_number(square: float, noise: float, tuning: MotionTuning = DEFAULT) -> float:

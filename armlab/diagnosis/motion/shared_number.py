@@ -354,7 +354,7 @@ def _is_made_by_encoder_steps(
         fit = fit_servo(joint.windows, bare, joint.free, tuning.refit_evaluations)
         counted.append(JointModel(replay_in_steps(joint.windows, fit.values), fit.values, joint.free))
     made = estimate_shared(number, counted, tuning)[0]
-    return made * found > 0 and made**2 > tuning.max_made * found**2
+    return made * found > 0 and made**2 > tuning.max_share_of_encoder_steps * found**2
 
 
 def _gain_of_all(

@@ -131,14 +131,14 @@ class MotionTuning:
         least=0.0,
         most=1.0,
     )
-    min_beyond: float = tuned(
+    min_share_beyond_noise: float = tuned(
         0.1,
         unit="of the squared error",
         meaning="that counts as more than the encoder's noise, at least; of what is more a number has to take its gain",
         least=0.0,
         most=1.0,
     )
-    max_made: float = tuned(
+    max_share_of_encoder_steps: float = tuned(
         0.1,
         unit="of the squared error that a number takes",
         meaning="that a drive without the difference gives as well, by reading its encoder in steps",

@@ -56,8 +56,8 @@ def joint_table(diagnosis: MotionDiagnosis) -> Table:
     """What is wrong with the servo of each joint, with its interval, and the replay error before and after."""
     rows, arm = [], diagnosis.simulation.arm
     for each in diagnosis.errors:
-        told = [one for one in stated_numbers(diagnosis) if not one.minor]
-        own = [one.finding for one in told if one.finding.joint == each.joint]
+        stated = [one for one in stated_numbers(diagnosis) if not one.minor]
+        own = [one.finding for one in stated if one.finding.joint == each.joint]
         words = "; ".join(finding_with_numbers(finding) for finding in own) or "–"
         before = "–" if each.replay_before is None else f"{1e3 * each.replay_before:.3g} mrad"
         rows.append((joint_in_table(arm, each.joint), words, before, f"{1e3 * each.replay_after:.3g} mrad"))

@@ -37,17 +37,17 @@ def summary_of(diagnosis: MotionDiagnosis) -> str:
     """At most three sentences and MAX_WORDS words; the first has at most MAX_FIRST_WORDS."""
     if diagnosis.status == "inconclusive":
         return f"Nothing can be said: {diagnosis.reason}."
-    told = [each for each in stated_numbers(diagnosis) if not each.minor]
+    stated = [each for each in stated_numbers(diagnosis) if not each.minor]
     if diagnosis.status == "none":
         first = "The simulation replays the held-out commands as well as any servo of this law."
-    elif not told:
+    elif not stated:
         first = "Nothing of practical size is missing: no number changes the replay by 5 %."
     else:
-        first = _where(diagnosis, told)
+        first = _where(diagnosis, stated)
     last = _replay_sentence(diagnosis)
     left = MAX_WORDS - len(first.split()) - len(last.split())
     shown = list[str]()
-    for each in sorted(told, key=lambda each: -each.share)[:MAX_FIGURES]:
+    for each in sorted(stated, key=lambda each: -each.share)[:MAX_FIGURES]:
         phrase = _figure_at_place(diagnosis.simulation.arm, each.finding)
         if len("; ".join([*shown, phrase]).split()) > left:
             break
@@ -57,12 +57,12 @@ def summary_of(diagnosis: MotionDiagnosis) -> str:
     return " ".join(each for each in (first, middle, last) if each)
 
 
-def _where(diagnosis: MotionDiagnosis, told: Sequence[StatedNumber]) -> str:
+def _where(diagnosis: MotionDiagnosis, stated: Sequence[StatedNumber]) -> str:
     """The causes with their shares of the replay error, the largest first."""
     arm, shown = diagnosis.simulation.arm, list[str]()
-    causes = stated_causes(told)
+    causes = stated_causes(stated)
     for each in causes:
-        own = [told[at] for at in each.findings]
+        own = [stated[at] for at in each.findings]
         names = list(dict.fromkeys(finding_name(one.finding) for one in own))
         name = each.cause if each.cause == FRICTION and len(names) > 1 else join_words(names)
         name = SOMETHING_UNKNOWN if each.cause == UNKNOWN.id else name
@@ -159,16 +159,16 @@ def motion_lines(diagnosis: MotionDiagnosis, verbose: bool = False) -> Iterator[
 
 
 def finding_phrases(diagnosis: MotionDiagnosis, minor: bool) -> list[str]:
-    """Each finding that is told, or each minor one, in one line with the probability of its name."""
-    told = [each for each in stated_numbers(diagnosis) if each.minor == minor]
-    return [_finding_phrase(diagnosis.simulation.arm, each) for each in told]
+    """Each finding that is stated, or each minor one, in one line with the probability of its name."""
+    stated = [each for each in stated_numbers(diagnosis) if each.minor == minor]
+    return [_finding_phrase(diagnosis.simulation.arm, each) for each in stated]
 
 
-def _finding_phrase(arm: Arm, told: StatedNumber) -> str:
-    finding = told.finding
+def _finding_phrase(arm: Arm, stated: StatedNumber) -> str:
+    finding = stated.finding
     rivals = " or ".join(effect_named(each).words for each in finding.rivals)
     also = f"; it could also be {rivals}" if rivals else ""
-    chance = format_chance(told.naming.probability_of(finding.effect, finding.joint))
+    chance = format_chance(stated.naming.probability_of(finding.effect, finding.joint))
     return f"{_places(arm, [finding])}: {finding_with_numbers(finding)}; probability of the name {chance}{also}"
 
 

@@ -82,17 +82,17 @@ def is_minor(each: ServoFinding, sample: float) -> bool:
 def _within_limits(numbers: Sequence[StatedNumber], sample: float) -> tuple[StatedNumber, ...]:
     """Of each joint the two that explain most, of four causes at most; the others but what is always told are minor."""
     out, fixed = list(numbers), {at for at, each in enumerate(numbers) if is_always_stated(each.finding, sample)}
-    told_at = [at for at, each in enumerate(out) if not each.minor]
-    ordered = sorted(told_at, key=lambda at: (at not in fixed, -out[at].share))
+    stated_at = [at for at, each in enumerate(out) if not each.minor]
+    ordered = sorted(stated_at, key=lambda at: (at not in fixed, -out[at].share))
     causes: dict[str, float] = {}
     for at in ordered:
         causes[out[at].cause] = causes.get(out[at].cause, 0.0) + out[at].share
-    told = sorted(causes, key=lambda cause: -causes[cause])[:MAX_STATED_CAUSES]
+    main_causes = sorted(causes, key=lambda cause: -causes[cause])[:MAX_STATED_CAUSES]
     places: dict[int, int] = {}
     for at in ordered:
         joint = out[at].finding.joint
         places[joint] = places.get(joint, 0) + 1
-        if at not in fixed and (places[joint] > MAX_STATED_OF_JOINT or out[at].cause not in told):
+        if at not in fixed and (places[joint] > MAX_STATED_OF_JOINT or out[at].cause not in main_causes):
             out[at] = replace(out[at], minor=True)
     return tuple(out)
 
