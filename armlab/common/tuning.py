@@ -11,9 +11,9 @@ V = TypeVar("V", int, float, tuple[float, ...])
 
 def tuned(
     value: V,
-    *,
-    unit: str = "",
     meaning: str,
+    unit: str = "",
+    *,
     source: str = BY_EYE,
     least: float = 0.0,
     most: float = math.inf,

@@ -23,66 +23,49 @@ REFUTE_SOURCE = "development sets: wrong names left 0.2 to 9 times what they exp
 class DataTuning:
     """How runs are filtered and thinned, and which rows count as moving."""
 
-    cutoff_hz: float = tuned(
-        40.0,
-        unit="Hz",
-        meaning="highest cut-off of the filter that torque and columns share",
-        least=0.1,
-    )
+    cutoff_hz: float = tuned(40.0, "highest cut-off of the filter that torque and columns share", "Hz", least=0.1)
     max_cutoff_ratio: float = tuned(
-        0.32, unit="of the sampling rate", meaning="highest cut-off of that filter", least=0.01, most=0.45
+        0.32, "highest cut-off of that filter", "of the sampling rate", least=0.01, most=0.45
     )
     rows_per_cutoff: float = tuned(
         2.2,
-        unit="rows a period of the cut-off",
-        meaning="rows that are kept: so few that whitening lifts hardly any frequency that the filter has emptied",
+        "rows that are kept: so few that whitening lifts hardly any frequency that the filter has emptied",
+        "rows a period of the cut-off",
         least=0.1,
     )
     position_cutoff_ratio: float = tuned(
         2.0,
-        unit="of the torque's cut-off",
-        meaning="cut-off of the positions: what the torque holds, the motion has to hold too",
+        "cut-off of the positions: what the torque holds, the motion has to hold too",
+        "of the torque's cut-off",
         least=0.1,
     )
     max_position_cutoff_ratio: float = tuned(
-        0.4, unit="of the sampling rate", meaning="highest cut-off of the positions", least=0.01, most=0.45
+        0.4, "highest cut-off of the positions", "of the sampling rate", least=0.01, most=0.45
     )
     max_encoder_share: float = tuned(
         0.5,
-        unit="of the torque's power density",
-        meaning="encoder noise in the columns that ends the usable frequencies",
+        "encoder noise in the columns that ends the usable frequencies",
+        "of the torque's power density",
         source="a recording with nothing hidden: above it delays of 5 ms were claimed that cancel each other",
     )
-    min_cutoff_hz: float = tuned(
-        10.0, unit="Hz", meaning="cut-off that is used however much the encoders disturb", least=0.1
-    )
-    median_width: int = tuned(
-        41, unit="frequencies", meaning="width of the running median of the torque's power", least=1
-    )
-    inertia_states: int = tuned(50, unit="states a run", meaning="states at which the mass matrix is averaged", least=1)
-    standstill_sigmas: float = tuned(
-        5.0, unit="standard deviations of the velocity's noise", meaning="a slower joint stands still"
-    )
-    creep_ratio: float = tuned(
-        0.01, unit="of the joint's high speed", meaning="below it friction takes any value up to its level"
-    )
-    high_speed_quantile: float = tuned(
-        0.95, unit="quantile", meaning="quantile of a joint's speed that is its high speed", most=1.0
-    )
-    min_standstill_s: float = tuned(0.004, unit="s", meaning="shorter standstills are single samples")
+    min_cutoff_hz: float = tuned(10.0, "cut-off that is used however much the encoders disturb", "Hz", least=0.1)
+    median_width: int = tuned(41, "width of the running median of the torque's power", "frequencies", least=1)
+    inertia_states: int = tuned(50, "states at which the mass matrix is averaged", "states a run", least=1)
+    standstill_sigmas: float = tuned(5.0, "a slower joint stands still", "standard deviations of the velocity's noise")
+    creep_ratio: float = tuned(0.01, "below it friction takes any value up to its level", "of the joint's high speed")
+    high_speed_quantile: float = tuned(0.95, "quantile of a joint's speed that is its high speed", "quantile", most=1.0)
+    min_standstill_s: float = tuned(0.004, "shorter standstills are single samples", "s")
     standstill_margin: float = tuned(
-        1.5, unit="periods of the cut-off", meaning="how far the filter carries a standstill to both sides"
+        1.5, "how far the filter carries a standstill to both sides", "periods of the cut-off"
     )
-    min_segment_rows: int = tuned(
-        40, unit="rows", meaning="shorter stretches in motion tell too little of the noise", least=2
-    )
+    min_segment_rows: int = tuned(40, "shorter stretches in motion tell too little of the noise", "rows", least=2)
     min_moving_share: float = tuned(
-        0.1, unit="of the rows", meaning="a joint with fewer moving rows counts as moving all the time", most=1.0
+        0.1, "a joint with fewer moving rows counts as moving all the time", "of the rows", most=1.0
     )
     held_out_blocks: int = tuned(
-        6, unit="blocks a run", meaning="blocks of time that a run is cut into where no run validates", least=2
+        6, "blocks of time that a run is cut into where no run validates", "blocks a run", least=2
     )
-    held_out_every: int = tuned(3, unit="blocks", meaning="every so many-th of these blocks is held out", least=2)
+    held_out_every: int = tuned(3, "every so many-th of these blocks is held out", "blocks", least=2)
 
 
 @dataclass(frozen=True)
@@ -90,12 +73,10 @@ class SoundnessTuning:
     """When a recording cannot be used, or was read wrongly."""
 
     unit_factor: float = tuned(
-        3.0, meaning="torque that is so many times too large or small on all joints is in another unit", least=1.0
+        3.0, "torque that is so many times too large or small on all joints is in another unit", least=1.0
     )
     min_explained_share: float = tuned(
-        0.3,
-        unit="of the torque's scatter",
-        meaning="a simulation that explains less on a joint tells nothing of its unit",
+        0.3, "a simulation that explains less on a joint tells nothing of its unit", "of the torque's scatter"
     )
 
 
@@ -103,36 +84,34 @@ class SoundnessTuning:
 class NoiseTuning:
     """The autoregressive model of each joint's errors."""
 
-    max_order: int = tuned(12, unit="rows", meaning="highest order of the autoregression; BIC takes the best")
+    max_order: int = tuned(12, "highest order of the autoregression; BIC takes the best", "rows")
     min_rows_per_order: int = tuned(
-        4, unit="rows", meaning="rows of the shortest stretch for each order of the autoregression", least=1
+        4, "rows of the shortest stretch for each order of the autoregression", "rows", least=1
     )
     white_noise_share: float = tuned(
-        1e-3,
-        unit="of the variance",
-        meaning="white noise that is added: bounds how much a quiet band of frequencies is lifted",
+        1e-3, "white noise that is added: bounds how much a quiet band of frequencies is lifted", "of the variance"
     )
     min_free_share: float = tuned(
-        0.2, unit="of the rows", meaning="least degrees of freedom in the variance of the noise", least=0.01, most=1.0
+        0.2, "least degrees of freedom in the variance of the noise", "of the rows", least=0.01, most=1.0
     )
     max_prediction_loss: float = tuned(
         0.02,
-        unit="of the held-out squared error",
-        meaning="loss of the whitened fit on held-out stretches, against a plain one, above which errors are white",
+        "loss of the whitened fit on held-out stretches, against a plain one, above which errors are white",
+        "of the held-out squared error",
     )
     filter_correlation_rows: float = tuned(
-        1.5, unit="rows", meaning="rows at rest that the filter of the torque ties together", least=0.1
+        1.5, "rows at rest that the filter of the torque ties together", "rows", least=0.1
     )
     min_moving_share: float = tuned(
         0.5,
-        unit="of the rows",
-        meaning="rows in motion from which on the colour of their noise is that of rows at rest, too",
+        "rows in motion from which on the colour of their noise is that of rows at rest, too",
+        "of the rows",
         source="0.16 to 0.31 of the rows are at rest in quick motion, 0.8 in the slow one of a collaborative arm",
     )
     max_rest_ratio: float = tuned(
         1.5,
-        unit="of the whitened errors in motion",
-        meaning="errors at rest up to which the colour of noise in motion is that of rest, too",
+        "errors at rest up to which the colour of noise in motion is that of rest, too",
+        "of the whitened errors in motion",
         source="1.0 to 1.3 where friction follows velocity, 1.9 and more where joints stick (development sets)",
     )
 
@@ -142,20 +121,15 @@ class LinkTuning:
     """The widths of the links' errors that the search tries."""
 
     uncertainty_grid: tuple[float, ...] = tuned(
-        (0.01, 0.02, 0.04, 0.08, 0.16),
-        unit="of the links' inertia",
-        meaning="widths that all links have alike",
-        least=1e-6,
+        (0.01, 0.02, 0.04, 0.08, 0.16), "widths that all links have alike", "of the links' inertia", least=1e-6
     )
     single_link_grid: tuple[float, ...] = tuned(
         (0.01, 0.02, 0.04, 0.08, 0.16, 0.5),
-        unit="of the links' inertia",
-        meaning="widths of one link, which may carry what the simulation does not know",
+        "widths of one link, which may carry what the simulation does not know",
+        "of the links' inertia",
         least=1e-6,
     )
-    initial_width: float = tuned(
-        0.08, unit="of the links' inertia", meaning="width of all links in the first fit", least=1e-6
-    )
+    initial_width: float = tuned(0.08, "width of all links in the first fit", "of the links' inertia", least=1e-6)
 
 
 @dataclass(frozen=True)
@@ -164,20 +138,15 @@ class SolverTuning:
 
     ridge: float = tuned(
         1e-9,
-        unit="of a column's squared length",
-        meaning="added to the normal equations: columns that hold each other do not stop a fit",
+        "added to the normal equations: columns that hold each other do not stop a fit",
+        "of a column's squared length",
         least=1e-15,
     )
     min_unabsorbed_share: float = tuned(
-        1e-6,
-        unit="of a column's squared length",
-        meaning="a column of which other columns leave less is not seen",
-        least=1e-15,
+        1e-6, "a column of which other columns leave less is not seen", "of a column's squared length", least=1e-15
     )
     crowd_penalty: float = tuned(
-        4.0,
-        unit="log likelihood",
-        meaning="what each unusual effect makes the next one dearer: many at once are rare",
+        4.0, "what each unusual effect makes the next one dearer: many at once are rare", "log likelihood"
     )
 
 
@@ -185,14 +154,14 @@ class SolverTuning:
 class SearchTuning:
     """The search for a set of effects."""
 
-    rounds: int = tuned(2, meaning="rounds of search and of better shapes, before the last search", least=1)
+    rounds: int = tuned(2, "rounds of search and of better shapes, before the last search", least=1)
     max_candidates_asked: int = tuned(
-        40, unit="candidates", meaning="best candidates of a step that are asked for their physics", least=1
+        40, "best candidates of a step that are asked for their physics", "candidates", least=1
     )
     max_unusual_effects: int = tuned(
-        12, unit="effects", meaning="effects beside usual friction: a start that asks for more has lost its way"
+        12, "effects beside usual friction: a start that asks for more has lost its way", "effects"
     )
-    min_score_step: float = tuned(1e-6, unit="log likelihood", meaning="smaller gains of a move are rounding")
+    min_score_step: float = tuned(1e-6, "smaller gains of a move are rounding", "log likelihood")
 
 
 @dataclass(frozen=True)
@@ -200,33 +169,25 @@ class RefineTuning:
     """The local search for an effect's shape."""
 
     evaluations_per_shape: int = tuned(
-        18, unit="evaluations", meaning="evaluations of the local search for each shape parameter", least=1
+        18, "evaluations of the local search for each shape parameter", "evaluations", least=1
     )
-    logarithmic_ratio: float = tuned(30.0, meaning="bounds so far apart are searched by their logarithm", least=1.0)
-    first_step: float = tuned(
-        0.08, unit="of the way between the bounds", meaning="first step of the local search", least=1e-6
-    )
-    shape_tolerance: float = tuned(
-        1e-4, unit="of the way between the bounds", meaning="change of the shape that ends the search"
-    )
-    gain_tolerance: float = tuned(0.05, unit="log likelihood", meaning="change of the gain that ends the search")
+    logarithmic_ratio: float = tuned(30.0, "bounds so far apart are searched by their logarithm", least=1.0)
+    first_step: float = tuned(0.08, "first step of the local search", "of the way between the bounds", least=1e-6)
+    shape_tolerance: float = tuned(1e-4, "change of the shape that ends the search", "of the way between the bounds")
+    gain_tolerance: float = tuned(0.05, "change of the gain that ends the search", "log likelihood")
 
 
 @dataclass(frozen=True)
 class BlockTuning:
     """Stretches of time as the units of chance in identification rows."""
 
-    block_s: float = tuned(
-        0.5, unit="s", meaning="length of a stretch: longer than what whitening leaves of any tie", least=1e-3
-    )
-    min_blocks: int = tuned(
-        60, unit="stretches", meaning="least number of stretches: shorter where time is short", least=2
-    )
-    folds: int = tuned(5, meaning="parts of the identification stretches that are held out in turn", least=2)
+    block_s: float = tuned(0.5, "length of a stretch: longer than what whitening leaves of any tie", "s", least=1e-3)
+    min_blocks: int = tuned(60, "least number of stretches: shorter where time is short", "stretches", least=2)
+    folds: int = tuned(5, "parts of the identification stretches that are held out in turn", least=2)
     max_variance_ratio: float = tuned(
         1e5,
-        unit="of the least variance",
-        meaning="directions with a larger variance, which other columns hold as well, are not tested",
+        "directions with a larger variance, which other columns hold as well, are not tested",
+        "of the least variance",
         least=1.0,
     )
 
@@ -235,49 +196,49 @@ class BlockTuning:
 class PredictionTuning:
     """The model that predicts: its cut-off, and what it holds beside the named effects."""
 
-    folds: int = tuned(6, unit="blocks", meaning="blocks of time of the identification runs, held out in turn", least=2)
+    folds: int = tuned(6, "blocks of time of the identification runs, held out in turn", "blocks", least=2)
     cutoff_shares: tuple[float, ...] = tuned(
         (0.5, 0.7),
-        unit="of the cut-off that the positions suggest",
-        meaning="lower cut-offs that are tried, as `identify` tries them",
+        "lower cut-offs that are tried, as `identify` tries them",
+        "of the cut-off that the positions suggest",
         least=0.01,
     )
-    least_change: float = tuned(0.8, unit="of the present cut-off", meaning="higher cut-offs are not tried", most=1.0)
+    least_change: float = tuned(0.8, "higher cut-offs are not tried", "of the present cut-off", most=1.0)
     min_trial_gain: float = tuned(
         0.02,
-        unit="of the held-out error",
-        meaning="a lower cut-off, or links near a robot file, have to lower the error by more",
+        "a lower cut-off, or links near a robot file, have to lower the error by more",
+        "of the held-out error",
         most=1.0,
     )
     link_widths: tuple[float, ...] = tuned(
         (0.1, 0.3, 1.0, 3.0),
-        unit="of the links' inertia",
-        meaning="how far links may be from a robot file that holds them, beside free links, where they are refitted",
+        "how far links may be from a robot file that holds them, beside free links, where they are refitted",
+        "of the links' inertia",
         least=1e-6,
     )
     min_gain: float = tuned(
         0.01,
-        unit="logarithm of the joints' errors",
-        meaning="a part that is present has to lower the errors by more",
+        "a part that is present has to lower the errors by more",
+        "logarithm of the joints' errors",
         source="1 % of the error of one joint, as the choice of `identify` asks",
     )
     min_standard_errors: float = tuned(
         2.0,
-        unit="standard errors between blocks",
-        meaning="a change has to lower the errors by more",
+        "a change has to lower the errors by more",
+        "standard errors between blocks",
         source="one is the rule of Breiman and others 1984 for one choice; two, after looks at the public arms",
     )
     smoothing_shares: tuple[float, ...] = tuned(
         (0.35, 0.5, 0.7, 1.0, 1.4, 2.0),
-        unit="of the cut-off that the positions suggest",
-        meaning="cut-offs of the positions that are tried for predictions",
+        "cut-offs of the positions that are tried for predictions",
+        "of the cut-off that the positions suggest",
         least=0.01,
     )
     max_follow_rounds: int = tuned(
-        8, unit="fits", meaning="fits with columns that follow the model, before it counts as one that does not settle"
+        8, "fits with columns that follow the model, before it counts as one that does not settle", "fits"
     )
     follow_tolerance: float = tuned(
-        0.01, unit="of the rms error", meaning="change of the errors from one such fit to the next that is settled"
+        0.01, "change of the errors from one such fit to the next that is settled", "of the rms error"
     )
 
 
@@ -285,58 +246,49 @@ class PredictionTuning:
 class EvidenceTuning:
     """The evidence for each effect."""
 
-    block_s: float = tuned(
-        1.0, unit="s", meaning="length of the stretches of validation runs that are compared", least=1e-3
-    )
-    min_blocks: int = tuned(12, unit="stretches", meaning="least number of these stretches", least=2)
+    block_s: float = tuned(1.0, "length of the stretches of validation runs that are compared", "s", least=1e-3)
+    min_blocks: int = tuned(12, "least number of these stretches", "stretches", least=2)
     min_certain_share: float = tuned(
-        0.5,
-        unit="of the larger gain",
-        meaning="a held-out gain at least so large may say that the gain is sure",
-        most=1.0,
+        0.5, "a held-out gain at least so large may say that the gain is sure", "of the larger gain", most=1.0
     )
-    push_level: float = tuned(0.3, unit="of a push's peak", meaning="rows above it belong to the push", most=0.99)
-    min_push_s: float = tuned(0.15, unit="s", meaning="a push that is shorter in motion is a reversal")
+    push_level: float = tuned(0.3, "rows above it belong to the push", "of a push's peak", most=0.99)
+    min_push_s: float = tuned(0.15, "a push that is shorter in motion is a reversal", "s")
     min_push_moving_share: float = tuned(
-        0.5, unit="of the push's rows", meaning="part of a push in which the joint has to move", most=1.0
+        0.5, "part of a push in which the joint has to move", "of the push's rows", most=1.0
     )
     max_extreme_share: float = tuned(
         0.5,
-        unit="of the push's rows",
-        meaning="part of a push in which position, speed or torque may be beyond all other stretches",
+        "part of a push in which position, speed or torque may be beyond all other stretches",
+        "of the push's rows",
         most=1.0,
     )
     wider_links_factor: float = tuned(
         3.0,
-        unit="of the widest link",
-        meaning="widths of the links with which every effect has to pass, too: nobody knows that width",
+        "widths of the links with which every effect has to pass, too: nobody knows that width",
+        "of the widest link",
     )
     min_excitation: float = tuned(
         0.25,
-        unit="of the mean square in identification",
-        meaning="validation runs that excite an effect less may fail to profit from it",
+        "validation runs that excite an effect less may fail to profit from it",
+        "of the mean square in identification",
     )
     max_loss: float = tuned(
-        0.002, unit="of the validation error", meaning="growth that is allowed where validation excites an effect"
+        0.002, "growth that is allowed where validation excites an effect", "of the validation error"
     )
     max_loss_unexcited: float = tuned(
         0.01,
-        unit="of the validation error",
-        meaning="growth that is allowed where validation hardly excites an effect",
+        "growth that is allowed where validation hardly excites an effect",
+        "of the validation error",
         source="validation run of the UR10",
     )
     max_whitened_loss: float = tuned(
         0.05,
-        unit="of the gain in identification",
-        meaning="whitened loss in validation that is little where validation hardly excites an effect",
+        "whitened loss in validation that is little where validation hardly excites an effect",
+        "of the gain in identification",
     )
-    worse_level: float = tuned(
-        0.99, unit="one-sided p-value of a gain", meaning="above it the loss in validation is sure", most=1.0
-    )
+    worse_level: float = tuned(0.99, "above it the loss in validation is sure", "one-sided p-value of a gain", most=1.0)
     min_likelihood_ratio: float = tuned(
-        20.0,
-        meaning="a law that stands for usual friction has to be so many times likelier than it",
-        least=1.0,
+        20.0, "a law that stands for usual friction has to be so many times likelier than it", least=1.0
     )
 
 
@@ -345,43 +297,32 @@ class PruningTuning:
     """What an effect has to pass to be claimed."""
 
     level: float = tuned(
-        0.01,
-        unit="probability",
-        meaning="chance of any false claim on a recording with nothing missing",
-        least=1e-12,
-        most=1.0,
+        0.01, "chance of any false claim on a recording with nothing missing", "probability", least=1e-12, most=1.0
     )
     least_gain: float = tuned(
         0.03,
-        unit="of the joint's held-out error",
-        meaning="gain that a claim has to make on held-out data",
+        "gain that a claim has to make on held-out data",
+        "of the joint's held-out error",
         source="development sets: of 30 right findings above two detection limits 29 gained more, wrong ones 2 to 3 %",
     )
     least_evidence: float = tuned(
         60.0,
-        unit="log likelihood",
-        meaning="what a name adds to the log evidence: below, laws that resemble one another are confused",
+        "what a name adds to the log evidence: below, laws that resemble one another are confused",
+        "log likelihood",
         source=EVIDENCE_SOURCE,
     )
     self_evident_gain: float = tuned(
-        0.25, unit="of the joint's held-out error", meaning="gain that needs no other evidence for its name"
+        0.25, "gain that needs no other evidence for its name", "of the joint's held-out error"
     )
     single_event_share: float = tuned(
-        1 / 3, unit="of least_gain", meaning="gain of what happened once: it acts in a small part of the time"
+        1 / 3, "gain of what happened once: it acts in a small part of the time", "of least_gain"
     )
-    held_out_level: float = tuned(
-        0.05, unit="one-sided p-value", meaning="level of the test that a held-out gain is sure", most=1.0
-    )
-    large_gain: float = tuned(
-        0.2, unit="of the joint's held-out error", meaning="gain to which large_gain_level applies"
-    )
+    held_out_level: float = tuned(0.05, "level of the test that a held-out gain is sure", "one-sided p-value", most=1.0)
+    large_gain: float = tuned(0.2, "gain to which large_gain_level applies", "of the joint's held-out error")
     large_gain_level: float = tuned(
-        0.2,
-        unit="one-sided p-value",
-        meaning="that level for a large gain, though a few stretches hold most of it",
-        most=1.0,
+        0.2, "that level for a large gain, though a few stretches hold most of it", "one-sided p-value", most=1.0
     )
-    max_cycles: int = tuned(3, unit="cycles", meaning="cycles of withdrawing and looking again", least=1)
+    max_cycles: int = tuned(3, "cycles of withdrawing and looking again", "cycles", least=1)
 
 
 @dataclass(frozen=True)
@@ -390,100 +331,83 @@ class SurrogateTuning:
 
     ridge_exponents: tuple[float, ...] = tuned(
         (-6.0, -5.0, -4.0, -3.0, -2.0, -1.0, 0.0, 1.0),
-        unit="powers of ten of a feature's mean squared length",
-        meaning="ridges that are tried",
+        "ridges that are tried",
+        "powers of ten of a feature's mean squared length",
         least=-12.0,
         most=12.0,
     )
-    fold_s: float = tuned(2.0, unit="s", meaning="length of the stretches that choose the ridge in turn", least=1e-3)
-    block_s: float = tuned(
-        0.5, unit="s", meaning="length of the stretches that are compared on held-out data", least=1e-3
-    )
-    min_blocks: int = tuned(12, unit="stretches", meaning="least number of these stretches", least=3)
-    hats: int = tuned(8, unit="functions", meaning="piecewise linear functions of a variable", least=3)
-    fine_hats: int = tuned(16, unit="functions", meaning="the same, where one variable matters most", least=3)
+    fold_s: float = tuned(2.0, "length of the stretches that choose the ridge in turn", "s", least=1e-3)
+    block_s: float = tuned(0.5, "length of the stretches that are compared on held-out data", "s", least=1e-3)
+    min_blocks: int = tuned(12, "least number of these stretches", "stretches", least=3)
+    hats: int = tuned(8, "piecewise linear functions of a variable", "functions", least=3)
+    fine_hats: int = tuned(16, "the same, where one variable matters most", "functions", least=3)
     position_hats: int = tuned(
-        12, unit="functions", meaning="piecewise linear functions of a position that multiply the velocity", least=3
+        12, "piecewise linear functions of a position that multiply the velocity", "functions", least=3
     )
     fine_position_hats: int = tuned(
-        24, unit="functions", meaning="piecewise linear functions of a position alone or with the sign", least=3
+        24, "piecewise linear functions of a position alone or with the sign", "functions", least=3
     )
     product_positions: int = tuned(
-        4, unit="functions", meaning="piecewise linear functions of each of two positions, for products", least=3
+        4, "piecewise linear functions of each of two positions, for products", "functions", least=3
     )
     product_speeds: int = tuned(
-        5, unit="functions", meaning="piecewise linear functions of speed and of acceleration, for products", least=3
+        5, "piecewise linear functions of speed and of acceleration, for products", "functions", least=3
     )
-    waves: int = tuned(16, unit="waves", meaning="random waves of a pair of variables", least=2)
-    few_joints: int = tuned(4, unit="joints", meaning="an arm with more joints gets half as many waves a pair")
-    max_pairs: int = tuned(6, unit="pairs", meaning="pairs of other joints that get waves")
+    waves: int = tuned(16, "random waves of a pair of variables", "waves", least=2)
+    few_joints: int = tuned(4, "an arm with more joints gets half as many waves a pair", "joints")
+    max_pairs: int = tuned(6, "pairs of other joints that get waves", "pairs")
     sign_widths: tuple[float, ...] = tuned(
         (0.005, 0.02, 0.06, 0.2, 0.6),
-        unit="of the largest value",
-        meaning="widths of smooth signs of the velocity, and of the load",
+        "widths of smooth signs of the velocity, and of the load",
+        "of the largest value",
         least=1e-6,
         count=3,
     )
     turning_ways: tuple[float, ...] = tuned(
-        (0.01, 0.03, 0.1, 0.3),
-        unit="of a joint's travel",
-        meaning="ways after a reversal over which hysteresis turns",
-        least=1e-6,
+        (0.01, 0.03, 0.1, 0.3), "ways after a reversal over which hysteresis turns", "of a joint's travel", least=1e-6
     )
     memories_s: tuple[float, ...] = tuned(
-        (0.02, 0.1, 0.5),
-        unit="s",
-        meaning="lags of signs and velocities, for what depends on the way since a reversal",
-        least=1e-6,
+        (0.02, 0.1, 0.5), "lags of signs and velocities, for what depends on the way since a reversal", "s", least=1e-6
     )
-    fastest_swing_hz: float = tuned(25.0, unit="Hz", meaning="fastest of the springs that a load drives", least=1e-3)
+    fastest_swing_hz: float = tuned(25.0, "fastest of the springs that a load drives", "Hz", least=1e-3)
     max_swing_share: float = tuned(
-        0.25, unit="of the sampling rate", meaning="fastest of them where samples are few", least=0.01, most=0.45
+        0.25, "fastest of them where samples are few", "of the sampling rate", least=0.01, most=0.45
     )
-    swing_range: float = tuned(50.0, meaning="fastest of them over slowest", least=1.1)
-    swings: int = tuned(14, unit="springs", meaning="how many of them, in equal ratios", least=2)
-    swing_damping: float = tuned(0.12, meaning="their damping ratio: each answers as far as the next one", least=1e-6)
-    min_noise_gain: float = tuned(
-        0.02, unit="of the held-out error", meaning="gain of a prediction that is taken out of the noise"
-    )
+    swing_range: float = tuned(50.0, "fastest of them over slowest", least=1.1)
+    swings: int = tuned(14, "how many of them, in equal ratios", "springs", least=2)
+    swing_damping: float = tuned(0.12, "their damping ratio: each answers as far as the next one", least=1e-6)
+    min_noise_gain: float = tuned(0.02, "gain of a prediction that is taken out of the noise", "of the held-out error")
     noise_level: float = tuned(
-        0.05,
-        unit="p-value",
-        meaning="below it a prediction counts as no noise: else whitening would hide what is slow",
-        most=1.0,
+        0.05, "below it a prediction counts as no noise: else whitening would hide what is slow", "p-value", most=1.0
     )
     min_structure_gain: float = tuned(
-        0.03,
-        unit="of the held-out error",
-        meaning="gain of structure: less may be what known effects are known too little of",
+        0.03, "gain of structure: less may be what known effects are known too little of", "of the held-out error"
     )
     min_variable_share: float = tuned(
-        0.1, unit="of the gain", meaning="part of the gain that is lost without an important variable", most=1.0
+        0.1, "part of the gain that is lost without an important variable", "of the gain", most=1.0
     )
-    max_variables: int = tuned(4, unit="variables", meaning="important variables that are named", least=1)
+    max_variables: int = tuned(4, "important variables that are named", "variables", least=1)
 
 
 @dataclass(frozen=True)
 class LocationTuning:
     """Where the error is beyond the noise."""
 
-    bins: int = tuned(10, unit="bins", meaning="quantile bins of a variable", least=2)
+    bins: int = tuned(10, "quantile bins of a variable", "bins", least=2)
     block_s: float = tuned(
-        1.0, unit="s", meaning="length of the stretches whose scatter decides whether an excess is chance", least=1e-3
+        1.0, "length of the stretches whose scatter decides whether an excess is chance", "s", least=1e-3
     )
-    min_blocks: int = tuned(3, unit="stretches", meaning="least number of these stretches", least=2)
+    min_blocks: int = tuned(3, "least number of these stretches", "stretches", least=2)
     min_significance: float = tuned(
-        2.0,
-        unit="standard errors times sqrt(log(stretches + 1))",
-        meaning="excess error of a joint that is more than chance",
+        2.0, "excess error of a joint that is more than chance", "standard errors times sqrt(log(stretches + 1))"
     )
     min_share: float = tuned(
         0.5,
-        unit="of the worst bin's or run's excess, or of all excess",
-        meaning="bins with more of it are the regime, runs are affected, a stretch is named by its time",
+        "bins with more of it are the regime, runs are affected, a stretch is named by its time",
+        "of the worst bin's or run's excess, or of all excess",
         most=0.99,
     )
-    peak_parts: int = tuned(10, meaning="a peak is no longer than one of so many equal parts of a run", least=1)
+    peak_parts: int = tuned(10, "a peak is no longer than one of so many equal parts of a run", least=1)
 
 
 @dataclass(frozen=True)
@@ -491,33 +415,30 @@ class UnknownTuning:
     """When structure that is left is a finding, and when it contradicts a name."""
 
     level: float = tuned(
-        0.03,
-        unit="p-value",
-        meaning="level of structure without a name, after all surrogates that were tried",
-        most=1.0,
+        0.03, "level of structure without a name, after all surrogates that were tried", "p-value", most=1.0
     )
     max_residual_ratio: float = tuned(
         1.0,
-        unit="of the error that a law explains",
-        meaning="structure above it withdraws the name of the law",
+        "structure above it withdraws the name of the law",
+        "of the error that a law explains",
         source=REFUTE_SOURCE,
     )
     form_error_share: float = tuned(
         0.25,
-        unit="of the error that a law explains",
-        meaning="structure below it comes from the form of the law, and is no finding",
+        "structure below it comes from the form of the law, and is no finding",
+        "of the error that a law explains",
         source=REFUTE_SOURCE,
     )
     min_curve_share: float = tuned(
         0.5,
-        unit="of the error that a surrogate explains",
-        meaning="what a friction curve has to explain of structure that depends on the joint's own velocity alone",
+        "what a friction curve has to explain of structure that depends on the joint's own velocity alone",
+        "of the error that a surrogate explains",
         most=1.0,
     )
     min_curve_error: float = tuned(
         0.5,
-        unit="of what is left at a joint",
-        meaning="structure of the velocity alone that is more asks for a friction curve, whatever formula stands there",
+        "structure of the velocity alone that is more asks for a friction curve, whatever formula stands there",
+        "of what is left at a joint",
         source="set after a look at the UR10",
     )
 
@@ -526,27 +447,23 @@ class UnknownTuning:
 class ClaimTuning:
     """How claims are stated: rivals, names of links, closed gaps."""
 
-    max_deficit: float = tuned(
-        2.0, unit="log likelihood", meaning="a rival whose score is lower by less may be as good by chance"
-    )
+    max_deficit: float = tuned(2.0, "a rival whose score is lower by less may be as good by chance", "log likelihood")
     outlying_factor: float = tuned(
-        4.0, unit="of the other links' median width", meaning="a link that is so much wider carries something"
+        4.0, "a link that is so much wider carries something", "of the other links' median width"
     )
     body_tolerance: float = tuned(
         0.05,
-        unit="of the held-out error, mean of the joints' logarithms",
-        meaning="a body at another link that predicts worse by less predicts as well",
+        "a body at another link that predicts worse by less predicts as well",
+        "of the held-out error, mean of the joints' logarithms",
     )
     max_unnamed_gain: float = tuned(
         0.25,
-        unit="of a joint's held-out error",
-        meaning="more that parts without a claim explain, where nothing is claimed, makes a verdict inconclusive",
+        "more that parts without a claim explain, where nothing is claimed, makes a verdict inconclusive",
+        "of a joint's held-out error",
         source="as pruning.self_evident_gain",
         most=1.0,
     )
-    min_gap: float = tuned(
-        0.02, unit="of the noise floor", meaning="a smaller gap between error and noise cannot be measured"
-    )
+    min_gap: float = tuned(0.02, "a smaller gap between error and noise cannot be measured", "of the noise floor")
 
 
 @dataclass(frozen=True)
@@ -555,39 +472,39 @@ class NamingTuning:
 
     level: float = tuned(
         0.9,
-        unit="probability",
-        meaning="of a name, or of the names of a class together, that is claimed",
+        "of a name, or of the names of a class together, that is claimed",
+        "probability",
         source="wanted: a name that is claimed is wrong once in ten times at most",
         least=0.5,
         most=1.0,
     )
     least_names: float = tuned(
         0.8,
-        unit="probability",
-        meaning="of the names of a class together, without `unknown`; with less a finding is unknown",
+        "of the names of a class together, without `unknown`; with less a finding is unknown",
+        "probability",
         source="development sets: one name in twenty that is claimed is wrong",
         least=0.5,
         most=1.0,
     )
-    max_class: int = tuned(4, unit="names", meaning="of a class; where more are needed, a finding is unknown", least=1)
+    max_class: int = tuned(4, "of a class; where more are needed, a finding is unknown", "names", least=1)
     least_unnamed_fall: float = tuned(
         0.05,
-        unit="of the held-out error",
-        meaning="fall from which on a law without a name is a finding",
+        "fall from which on a law without a name is a finding",
+        "of the held-out error",
         source="nulls judged on commit 15dd9f6: most false claims were such laws below it",
     )
-    shown: float = tuned(0.05, unit="probability", meaning="a less probable name is not listed", most=1.0)
-    names: int = tuned(8, unit="names", meaning="the likeliest effects that are weighed for a finding", least=1)
+    shown: float = tuned(0.05, "a less probable name is not listed", "probability", most=1.0)
+    names: int = tuned(8, "the likeliest effects that are weighed for a finding", "names", least=1)
     max_independent: float = tuned(
         0.5,
-        unit="of the log evidence",
-        meaning="what a law keeps beside a finding in whose place it would stand; with more it is another effect",
+        "what a law keeps beside a finding in whose place it would stand; with more it is another effect",
+        "of the log evidence",
         most=1.0,
     )
     least_addition: float = tuned(
-        8.0, unit="log evidence", meaning="what an effect adds that is weighed beside names that passed all tests"
+        8.0, "what an effect adds that is weighed beside names that passed all tests", "log evidence"
     )
-    max_additions: int = tuned(4, unit="effects", meaning="that are weighed beside names that passed all tests")
+    max_additions: int = tuned(4, "that are weighed beside names that passed all tests", "effects")
 
 
 @dataclass(frozen=True)
@@ -596,39 +513,39 @@ class PlausibilityTuning:
 
     certain_link_evidence: float = tuned(
         60.0,
-        unit="log evidence",
-        meaning="with more a link is off for certain, though none of its ten numbers alone differs from zero",
+        "with more a link is off for certain, though none of its ten numbers alone differs from zero",
+        "log evidence",
         source="as pruning.least_evidence: joints feel sums of the numbers of links",
     )
 
     overwhelming_evidence: float = tuned(
         600.0,
-        unit="log likelihood",
-        meaning="what a name with a parameter outside its plausible range adds to the log evidence",
+        "what a name with a parameter outside its plausible range adds to the log evidence",
+        "log likelihood",
         source="ten times pruning.least_evidence: evidence counts structure that the library lacks, too",
     )
     overwhelming_gain: float = tuned(
         0.25,
-        unit="of the joint's held-out error",
-        meaning="gain on held-out data that such a name makes, too",
+        "gain on held-out data that such a name makes, too",
+        "of the joint's held-out error",
         source="as pruning.self_evident_gain",
     )
     max_interval_ratio: float = tuned(
         30.0,
-        meaning="highest over lowest end of the interval of a positive parameter that is known",
+        "highest over lowest end of the interval of a positive parameter that is known",
         source="development sets: 12 for a right finding; an interval of 94 % of the value to both sides has it",
         least=1.0,
     )
     max_order_error: float = tuned(
         0.5,
-        unit="cycles over the joint's travel",
-        meaning="half width of the interval of a wave's order",
+        "half width of the interval of a wave's order",
+        "cycles over the joint's travel",
         source="beyond half a cycle the wave at one end of the travel says nothing of that at the other",
     )
     max_unknown_ratio: float = tuned(
         0.5,
-        unit="of the rms torque of a link or load at a joint",
-        meaning="structure without a name beside which that link or load is known",
+        "structure without a name beside which that link or load is known",
+        "of the rms torque of a link or load at a joint",
         source="the KUKA's single runs: where an unnamed spring is as large, the load is off by half",
     )
 
@@ -638,15 +555,11 @@ class IntervalTuning:
     """Intervals of named parameters."""
 
     confidence: float = tuned(
-        0.95,
-        unit="probability",
-        meaning="chance that an interval holds the true value",
-        source="convention",
-        most=0.999999,
+        0.95, "chance that an interval holds the true value", "probability", source="convention", most=0.999999
     )
     factor: float = tuned(
         1.45,
-        meaning="widens intervals: what laws leave out at reversals is no noise",
+        "widens intervals: what laws leave out at reversals is no noise",
         source="development sets: of 605 parameters 81 % were held without it",
     )
 
@@ -656,67 +569,58 @@ class ComparisonTuning:
     """What changed between recordings."""
 
     stretch_s: float = tuned(
-        1.5,
-        unit="s",
-        meaning="length of the stretches of time whose scatter says how sure a change is",
-        least=1e-3,
+        1.5, "length of the stretches of time whose scatter says how sure a change is", "s", least=1e-3
     )
-    min_stretches: int = tuned(6, unit="stretches", meaning="shorter ones where a recording has fewer", least=2)
+    min_stretches: int = tuned(6, "shorter ones where a recording has fewer", "stretches", least=2)
     plain_cutoff_hz: float = tuned(
         5.0,
-        unit="Hz",
-        meaning="cut-off at which rigid links and friction are compared",
+        "cut-off at which rigid links and friction are compared",
+        "Hz",
         source="least squares on real arms: 3 to 10 Hz leave the least of the torque",
         least=0.1,
     )
-    same_length: float = tuned(
-        0.9, unit="of the longer run", meaning="runs of one motion are so long at least", most=1.0
-    )
-    same_motion: float = tuned(
-        0.02, unit="of the travel", meaning="how far apart the positions of runs of one motion may be"
-    )
+    same_length: float = tuned(0.9, "runs of one motion are so long at least", "of the longer run", most=1.0)
+    same_motion: float = tuned(0.02, "how far apart the positions of runs of one motion may be", "of the travel")
     typical_share: float = tuned(
         0.2,
-        unit="of the torque's root mean square",
-        meaning="scale of the normal prior of a change of which nothing else is known",
+        "scale of the normal prior of a change of which nothing else is known",
+        "of the torque's root mean square",
         least=1e-6,
     )
     typical_scale: float = tuned(
-        0.5, unit="of the friction", meaning="the same of a change of all friction of a joint by one factor", least=1e-6
+        0.5, "the same of a change of all friction of a joint by one factor", "of the friction", least=1e-6
     )
-    drift_waves: int = tuned(
-        6, unit="waves a run", meaning="slow waves in which offset and friction of a run may drift", least=1
-    )
+    drift_waves: int = tuned(6, "slow waves in which offset and friction of a run may drift", "waves a run", least=1)
     gain_drift: float = tuned(
         0.005,
-        unit="of the torque",
-        meaning="standard deviation of a motor's torque constant between runs",
+        "standard deviation of a motor's torque constant between runs",
+        "of the torque",
         source="NdFeB magnets lose about 0.11 % of their field per kelvin; five kelvin",
     )
     level: float = tuned(
-        0.01, unit="probability", meaning="of a false change in all that is compared", source="convention", most=1.0
+        0.01, "of a false change in all that is compared", "probability", source="convention", most=1.0
     )
     single_run_level: float = tuned(
         1e-5,
-        unit="probability",
-        meaning="the same of a change of links and friction where one recording has no second run to differ from",
+        "the same of a change of links and friction where one recording has no second run to differ from",
+        "probability",
         source="run against run of real arms with nothing changed: 1e-4 to 9e-3 where something was named",
         most=1.0,
     )
     least_evidence: float = tuned(
         5.0,
-        unit="log likelihood",
-        meaning="of a change, and of what the model has against a fault that it does not have; less is a rival",
+        "of a change, and of what the model has against a fault that it does not have; less is a rival",
+        "log likelihood",
         source="a Bayes factor of 150",
     )
     least_gain: float = tuned(
         0.003,
-        unit="of the held-out error",
-        meaning="gain that a change makes on stretches of the recordings that are held out in turn",
+        "gain that a change makes on stretches of the recordings that are held out in turn",
+        "of the held-out error",
     )
-    max_rivals: int = tuned(2, unit="rivals", meaning="most rivals of a change", source="a class has three names")
-    max_asked: int = tuned(12, unit="candidates", meaning="candidates that are tested at each step", least=1)
-    max_changes: int = tuned(8, unit="changes", meaning="most changes that are named", least=1)
+    max_rivals: int = tuned(2, "most rivals of a change", "rivals", source="a class has three names")
+    max_asked: int = tuned(12, "candidates that are tested at each step", "candidates", least=1)
+    max_changes: int = tuned(8, "most changes that are named", "changes", least=1)
 
 
 @dataclass(frozen=True)
