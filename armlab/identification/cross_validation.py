@@ -122,9 +122,9 @@ class FoldMoments:
         return float(np.sqrt(error / sum(float(np.sum(judge.power)) for judge in self.judge)))
 
 
-def fold_moments(fit: Regression, judge: Regression, blocks: int = FOLD_BLOCKS) -> FoldMoments:
+def fold_moments(fit: Regression, judge: Regression) -> FoldMoments:
     """Moments of each fold; fit and judge hold the same samples (`judge` perhaps the torque as recorded)."""
-    parts = list(folds(fit, blocks))
+    parts = list(folds(fit))
     return FoldMoments(
         tuple(regression_moments(fit.rows(part.fit)) for part in parts),
         tuple(regression_moments(judge.rows(part.judge)) for part in parts),

@@ -222,25 +222,18 @@ class PlainChanges:
         return np.divide(self.new - self.old, self.errors, out=np.zeros(len(self.old)), where=self.errors > 0)
 
 
-def compare_plain(
-    arm: Arm,
-    old: Sequence[Run],
-    new: Sequence[Run],
-    cutoff_hz: float,
-    joints: tuple[int, ...] | None = None,
-) -> PlainChanges:
-    """What differs between the runs of two recordings of an arm; joints: as `fit_plain` has it.
+def compare_plain(arm: Arm, old: Sequence[Run], new: Sequence[Run], cutoff_hz: float) -> PlainChanges:
+    """What differs between the runs of two recordings of an arm.
 
     Raises DataError where a recording has no run that is long enough.
     """
-    joints = tuple(range(len(arm))) if joints is None else joints
     both = [
         [each for run in runs for each in [prepare_rows(run, cutoff_hz)] if len(each.torque)] for runs in (old, new)
     ]
     if not all(both):
         raise DataError(f"a recording has no run longer than {2 * TRIMMED_PERIODS} periods of {cutoff_hz:g} Hz")
     top_speed = np.max([np.abs(each.motion.velocity).max(axis=0) for rows in both for each in rows], axis=0)
-    layout = PlainLayout(arm, joints, top_speed)
+    layout = PlainLayout(arm, tuple(range(len(arm))), top_speed)
     fits = [_fit_with_error(layout, rows) for rows in both]
     return PlainChanges(layout.names, fits[0][0], fits[1][0], np.hypot(fits[0][1], fits[1][1]))
 

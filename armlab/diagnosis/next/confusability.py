@@ -167,19 +167,15 @@ class Card:
 
 
 def confusability_card(
-    arm: Arm,
-    motions: Sequence[PlannedMotion],
-    families: Sequence[Family],
-    noise: Array | None = None,
-    settings: Settings | None = None,
+    arm: Arm, motions: Sequence[PlannedMotion], families: Sequence[Family], noise: Array | None = None
 ) -> Card:
     """The card of some motions taken together. noise: (joints,), N m (N); a share of the torque if left out.
 
     Raises ValueError where the families have no candidate on this motion.
     """
-    chosen = settings or Settings()
+    settings = Settings()
     scenes = tuple(_planned_scene(arm, each) for each in motions)
-    filters = tuple(_diagnosis_filter(each, chosen) for each in motions)
+    filters = tuple(_diagnosis_filter(each, settings) for each in motions)
     scatter = _default_noise(scenes) if noise is None else np.asarray(noise, dtype=float)
     candidates = visible_candidates(arm, scenes, filters, families)
     if not candidates:
@@ -187,7 +183,7 @@ def confusability_card(
     free = {"nominal": None, "refit": base_rows(base_parameters(arm), scenes, filters)}
     views = {name: compute_confusion(candidates, scenes, filters, free[name], scatter) for name in VIEWS}
     seconds = sum(float(each.time[-1] - each.time[0]) for each in motions)
-    rows = 2 * chosen.tuning.data.cutoff_hz * seconds
+    rows = 2 * settings.tuning.data.cutoff_hz * seconds
     entries = tuple(_card_entry(index, views, rows) for index in range(len(candidates)))
     cosines = {name: view.covered for name, view in views.items()}
     return Card(arm, ", ".join(each.name for each in motions), entries, cosines, scatter, rows)

@@ -26,9 +26,9 @@ class ConicProgram:
     def __post_init__(self) -> None:
         self._unknowns = self.size
 
-    def require_nonnegative(self, rows: Array, offset: Array | float = 0.0) -> None:
-        """rows @ x + offset >= 0, rows (conditions, unknowns)."""
-        self._add(rows, np.broadcast_to(offset, len(rows)), "NonnegativeConeT", len(rows))
+    def require_nonnegative(self, rows: Array) -> None:
+        """rows @ x >= 0, rows (conditions, unknowns)."""
+        self._add(rows, np.zeros(len(rows)), "NonnegativeConeT", len(rows))
 
     def require_semidefinite(self, matrices: Array, offset: Array) -> None:
         """offset + sum of x[k] * matrices[k] positive semidefinite; (unknowns, n, n) and (n, n), symmetric."""

@@ -82,12 +82,11 @@ def filtered_columns(candidate: Candidate, scenes: Sequence[Scene], observed: Ob
     return np.concatenate(parts)
 
 
-def base_columns(arm: Arm, base: BaseParameters, signals: Signals, same_filter: bool = True) -> list[Array]:
-    """Per joint the columns of the base parameters that load it, through the filter of the torque or not."""
+def base_columns(arm: Arm, base: BaseParameters, signals: Signals) -> list[Array]:
+    """Per joint the columns of the base parameters that load it, through the filter of the torque."""
     rigid = observation_matrix(arm, signals.motion).reshape(signals.motion.samples, len(arm), -1)
     loading = (base.columns[base.columns >= 10 * joint] for joint in range(len(arm)))
-    parts = [rigid[:, joint, chosen] for joint, chosen in enumerate(loading)]
-    return [np.asarray(signals.filter(part) if same_filter else part[signals.filter.rows]) for part in parts]
+    return [np.asarray(signals.filter(rigid[:, joint, chosen])) for joint, chosen in enumerate(loading)]
 
 
 @dataclass(frozen=True, eq=False)
