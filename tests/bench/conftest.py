@@ -7,8 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from small_results import Ran, ran
 
 from bench.execute import load_algorithm
+from bench.result_sets.formats import read_results
+from bench.result_sets.result_set import ResultSet
 
 SMALL = """\
 name: small
@@ -35,6 +38,18 @@ class PlugIn(RandomSearch):
 """
 ROOT = Path(__file__).parents[2]
 Armlab = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+@pytest.fixture(scope="module")
+def small_run(tmp_path_factory: pytest.TempPathFactory) -> Ran:
+    """The small experiment, run."""
+    return ran(tmp_path_factory.mktemp("run"))
+
+
+@pytest.fixture(scope="module")
+def results(small_run: Ran) -> ResultSet:
+    """What the small experiment gave."""
+    return read_results(*small_run)
 
 
 @pytest.fixture

@@ -9,18 +9,8 @@ from refusals import refusal
 from small_results import CONFIG, Ran, ran
 
 from bench.result_sets.compare import are_paired, compare_results, compare_sets
-from bench.result_sets.formats import read_results, share_results
+from bench.result_sets.formats import share_results
 from bench.result_sets.result_set import ResultSet
-
-
-@pytest.fixture(scope="module")
-def small_run(tmp_path_factory: pytest.TempPathFactory) -> Ran:
-    return ran(tmp_path_factory.mktemp("run"))
-
-
-@pytest.fixture(scope="module")
-def results(small_run: Ran) -> ResultSet:
-    return read_results(*small_run)
 
 
 def worse(results: ResultSet, algorithm: str, factor: float, settings: str | None = None) -> ResultSet:

@@ -21,16 +21,6 @@ from bench.statistics.critical_difference import block_losses, critical_differen
 from bench.statistics.performance import Run
 
 
-@pytest.fixture(scope="module")
-def small_run(tmp_path_factory: pytest.TempPathFactory) -> Ran:
-    return ran(tmp_path_factory.mktemp("run"))
-
-
-@pytest.fixture(scope="module")
-def results(small_run: Ran) -> ResultSet:
-    return read_results(*small_run)
-
-
 @pytest.fixture
 def cell() -> ProblemAnalysis:
     """Two repetitions of two algorithms, one of which finds nothing feasible once."""

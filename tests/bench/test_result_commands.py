@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from small_results import Ran, ran
+from small_results import Ran
 
 from armlab.cli.bench import compare, draw, share
 from armlab.cli.experiments import report
@@ -13,11 +13,6 @@ from bench.config import read_experiment
 from bench.plan import plan_trials
 from bench.store import open_store
 from bench.tables import convergence_table
-
-
-@pytest.fixture(scope="module")
-def small_run(tmp_path_factory: pytest.TempPathFactory) -> Ran:
-    return ran(tmp_path_factory.mktemp("run"))
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from refusals import refusal
-from small_results import CONFIG, Ran, ran
+from small_results import CONFIG, Ran
 
 from bench.config import read_experiment
 from bench.files import file_name
@@ -17,16 +17,6 @@ from bench.report.analysis import analyse_cells
 from bench.result_sets.formats import NOTHING_KNOWN, read_results, share_results
 from bench.result_sets.result_set import ResultSet, runs_by_algorithm
 from bench.store import open_store
-
-
-@pytest.fixture(scope="module")
-def small_run(tmp_path_factory: pytest.TempPathFactory) -> Ran:
-    return ran(tmp_path_factory.mktemp("run"))
-
-
-@pytest.fixture(scope="module")
-def results(small_run: Ran) -> ResultSet:
-    return read_results(*small_run)
 
 
 def test_a_result_set_has_every_trial_and_the_curve_of_each(small_run: Ran, results: ResultSet) -> None:
