@@ -9,7 +9,8 @@ from scipy.stats import t as student
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.arm_fit import ArmFit, number_of_tests
 from armlab.diagnosis.motion.choose import TESTS_OF_GAIN, ChosenServo, GainOfNumber
-from armlab.diagnosis.motion.held_out import command_error, rms_of, settled_errors
+from armlab.diagnosis.motion.estimate import rms_of
+from armlab.diagnosis.motion.held_out import command_error, settled_errors
 from armlab.diagnosis.motion.motion_result import ServoFinding
 from armlab.diagnosis.motion.separate import TORQUE_SCALED, confused_parameters, has_weak_load
 from armlab.diagnosis.motion.servo import PARAMETERS, ServoParameter, place

@@ -158,7 +158,7 @@ def fit_servo(
     part = np.concatenate([to_coordinates(values)[chosen], windows.integral[runs]])
     if len(part) == 0:
         errors = joint_errors(windows, values)[0]
-        rms, noise = _root_mean_square(errors), reading_noise(windows, values)
+        rms, noise = rms_of(errors), reading_noise(windows, values)
         return ServoFit(values, free, lambda: np.zeros((0, 0)), rms, noise, windows.count, windows.integral)
     low = np.concatenate([to_coordinates(LOWEST)[chosen], np.full(len(runs), -INTEGRAL_ROOM * wound_up)])
     high = np.concatenate([to_coordinates(HIGHEST)[chosen], np.full(len(runs), INTEGRAL_ROOM * wound_up)])
@@ -174,7 +174,7 @@ def fit_servo(
         xtol=tolerance,
     )
     moved, values = whole(solution.x)
-    rms, noise = _root_mean_square(solution.fun), reading_noise(windows, values)
+    rms, noise = rms_of(solution.fun), reading_noise(windows, values)
 
     def covariance() -> Array:
         return _covariance(solution.jac, solution.fun, windows.window, noise)[: len(chosen), : len(chosen)]
@@ -203,7 +203,7 @@ def price_of_number(square: float, noise: float, tuning: MotionTuning = DEFAULT)
     return float(-np.log(1 - least_gain(square, noise, tuning)))
 
 
-def _root_mean_square(errors: Array) -> float:
+def rms_of(errors: Array) -> float:
     return float(np.sqrt(np.mean(errors**2)))
 
 

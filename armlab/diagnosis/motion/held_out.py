@@ -8,7 +8,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.motion.choose import ChosenServo
-from armlab.diagnosis.motion.estimate import settle
+from armlab.diagnosis.motion.estimate import rms_of, settle
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.motion_result import MotionDiagnosis, ReplayError, ServoFinding
 from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay
@@ -174,10 +174,6 @@ def stretch_squares(windows: Windows, values: Array, tuning: MotionTuning) -> Ar
 def settled_errors(windows: Windows, values: Array) -> Array:
     """Errors (samples,) of a replay whose drive's integral at the start of each run fits best, rad."""
     return np.asarray(joint_errors(settle(windows, values), values)[0])
-
-
-def rms_of(errors: Array) -> float:
-    return float(np.sqrt(np.mean(errors**2)))
 
 
 def command_error(windows: Windows) -> Array:

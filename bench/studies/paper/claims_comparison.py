@@ -124,13 +124,13 @@ def _distance_to_printed(standing: Standing, rows: Mapping[str, PrintedRow]) -> 
 
 def _order_claims(evidence: Evidence) -> Iterator[Claim]:
     for statistic, reading in product(_STATISTICS, evidence.rankings):
-        printed = _sort_by_figure({name: getattr(row, statistic) for name, row in evidence.paper.table3.rows.items()})
-        ours = _sort_by_figure(_default_figures(evidence, statistic, reading))
+        printed = sort_by_figure({name: getattr(row, statistic) for name, row in evidence.paper.table3.rows.items()})
+        ours = sort_by_figure(_default_figures(evidence, statistic, reading))
         agreement = kendalltau(*([order.index(name) for name in sorted(order)] for order in (printed, ours))).statistic
         yield Claim(
             f"Table 3{_reading_text(reading)}",
-            f"ranking by {statistic.replace('_', ' ')}: {_format_order(printed)}",
-            f"{_format_order(ours)}; Kendall's tau {agreement:.2f}",
+            f"ranking by {statistic.replace('_', ' ')}: {format_order(printed)}",
+            f"{format_order(ours)}; Kendall's tau {agreement:.2f}",
             verdict_if(printed == ours),
             "the same order or not, under the default conventions; the other conventions stand in the ranking",
         )
@@ -148,11 +148,13 @@ def _reading_text(reading: str) -> str:
     return f"; algorithms: {READINGS[reading]}"
 
 
-def _sort_by_figure(figures: Mapping[str, float]) -> list[str]:
+def sort_by_figure(figures: Mapping[str, float]) -> list[str]:
+    """Names, the one with the least figure first."""
     return sorted(figures, key=figures.__getitem__)
 
 
-def _format_order(order: list[str]) -> str:
+def format_order(order: list[str]) -> str:
+    """`MuPSO < PSO`, as a ranking is printed."""
     return " < ".join(display_name(name) for name in order)
 
 
@@ -163,7 +165,7 @@ def _best_claims(evidence: Evidence) -> Iterator[Claim]:
         figures = [standing.minima if statistic == "minimum" else standing.averages for standing in usable]
         won = sum(min(by_name, key=lambda name: _nan_to_infinity(by_name[name])) == SUBJECT for by_name in figures)
         column = _default_figures(evidence, statistic, reading)
-        rank = _sort_by_figure(column).index(SUBJECT) + 1
+        rank = sort_by_figure(column).index(SUBJECT) + 1
         yield Claim(
             f"section 5, after Table 3{_reading_text(reading)}",
             says,

@@ -19,6 +19,7 @@ from bench.statistics.ends import quantile_interval
 from bench.statistics.power import power_text
 from bench.studies.best_known.records import record_key
 from bench.studies.paper.claims import percent_change
+from bench.studies.paper.claims_comparison import format_order, sort_by_figure
 from bench.studies.paper.ranking import SUBJECT
 from bench.studies.tuning.judged import TUNED, JudgedRuns, count_wins, duels_by_rival, read_judged_runs
 from problem.registry import parse_problem
@@ -150,7 +151,7 @@ def _column(evidence: TunedEvidence, statistic: str, tuned: bool) -> dict[str, f
 def _claims(paper: Printed) -> dict[str, Judge]:
     low, high = paper.conclusion.gain_percent
     ranked = {
-        f"ranking by {statistic.replace('_', ' ')}: {_format_order(_printed_order(paper, statistic))}": _order_judge(
+        f"ranking by {statistic.replace('_', ' ')}: {format_order(_printed_order(paper, statistic))}": _order_judge(
             statistic
         )
         for statistic in _STATISTICS
@@ -167,7 +168,7 @@ def _claims(paper: Printed) -> dict[str, Judge]:
 def _least_judge(statistic: str) -> Judge:
     def judge(evidence: TunedEvidence, paper: Printed, tuned: bool) -> _Outcome:
         column = _column(evidence, statistic, tuned)
-        rank = _order(column).index(SUBJECT) + 1
+        rank = sort_by_figure(column).index(SUBJECT) + 1
         return _Outcome(f"{statistic} {column[SUBJECT]:.3g}, rank {rank} of {len(column)}", rank == 1)
 
     return judge
@@ -182,9 +183,9 @@ def _judge_dominance(evidence: TunedEvidence, paper: Printed, tuned: bool) -> _O
 
 def _order_judge(statistic: str) -> Judge:
     def judge(evidence: TunedEvidence, paper: Printed, tuned: bool) -> _Outcome:
-        printed, ours = _printed_order(paper, statistic), _order(_column(evidence, statistic, tuned))
+        printed, ours = _printed_order(paper, statistic), sort_by_figure(_column(evidence, statistic, tuned))
         places = [[order.index(name) for name in sorted(printed)] for order in (printed, ours)]
-        return _Outcome(f"{_format_order(ours)}; Kendall's tau {kendalltau(*places).statistic:.2f}", printed == ours)
+        return _Outcome(f"{format_order(ours)}; Kendall's tau {kendalltau(*places).statistic:.2f}", printed == ours)
 
     return judge
 
@@ -197,15 +198,7 @@ def _judge_gains(evidence: TunedEvidence, paper: Printed, tuned: bool) -> _Outco
 
 
 def _printed_order(paper: Printed, statistic: str) -> list[str]:
-    return _order({name: getattr(row, statistic) for name, row in paper.table3.rows.items()})
-
-
-def _order(figures: Mapping[str, float]) -> list[str]:
-    return sorted(figures, key=figures.__getitem__)
-
-
-def _format_order(order: list[str]) -> str:
-    return " < ".join(display_name(name) for name in order)
+    return sort_by_figure({name: getattr(row, statistic) for name, row in paper.table3.rows.items()})
 
 
 def _outcome_cells(outcome: _Outcome) -> tuple[str, str]:
