@@ -128,15 +128,10 @@ def _print_document(document: Document, as_json: bool) -> None:
 
 
 def _start_progress(quiet: bool) -> Progress:
-    progress = Progress(_command_name(), quiet)
+    progress = Progress(click.get_current_context().command_path.partition(" ")[2], quiet)
     progress.start()
     click.get_current_context().meta[_PROGRESS] = progress
     return progress
-
-
-def _command_name() -> str:
-    """`recording check` of `armlab recording check`."""
-    return click.get_current_context().command_path.partition(" ")[2]
 
 
 def _current_progress() -> Progress | None:

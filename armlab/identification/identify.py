@@ -29,7 +29,6 @@ from armlab.identification.selection import (
 )
 from armlab.identification.torque_model import is_told, parameter_line
 from armlab.identification.validation import (
-    JointError,
     RunError,
     error_table,
     filter_of_errors,
@@ -112,16 +111,12 @@ def _joint_errors(errors: tuple[RunError, ...]) -> Table:
             str(joint.joint),
             f"{joint.rms:.4g}",
             format_percent(joint.percent),
-            _percent_of_rated(joint),
+            format_percent(joint.percent_rated),
         ]
         for each in errors
         for joint in each.joints
     ]
     return Table(["run", "role", "joint", "rms, N m", "of torque", "of rated torque"], rows, (0, 1), stacked=True)
-
-
-def _percent_of_rated(error: JointError) -> str:
-    return format_percent(error.percent_rated)
 
 
 def _parameters(model: Model) -> Table:

@@ -98,7 +98,7 @@ def select_rival_groups(verdict: VerdictWithModel, named: str | None) -> tuple[R
     """
     if named:
         return (_parse_rivals(verdict, named),)
-    groups = [_names_of_finding(finding) for finding in verdict.findings if finding.rivals]
+    groups = [tuple(dict.fromkeys((finding.name, *finding.rivals))) for finding in verdict.findings if finding.rivals]
     groups = [group for group in groups if len(group) > 1 and group[0].effect != UNKNOWN.id]
     unique = {frozenset(group): group for group in reversed(groups)}
     if not unique:
@@ -106,10 +106,6 @@ def select_rival_groups(verdict: VerdictWithModel, named: str | None) -> tuple[R
             f"{verdict.path}: no finding has rivals, so nothing is to be decided; --rivals a,b names what to tell apart"
         )
     return tuple(reversed(unique.values()))
-
-
-def _names_of_finding(finding: VerdictFinding) -> RivalGroup:
-    return tuple(dict.fromkeys((finding.name, *finding.rivals)))
 
 
 def _parse_rivals(verdict: VerdictWithModel, named: str) -> RivalGroup:

@@ -118,7 +118,7 @@ class PhysicalLeastSquares:
         rows = dissipation_rows(self.structure, self.fastest)
         if len(rows):
             program.require_nonnegative(rows / np.abs(rows).max(axis=1, keepdims=True) @ to_values)
-        triangle = _qr_triangle(np.column_stack([data.matrix / lengths, data.torque]))[: len(lengths)]
+        triangle = np.asarray(np.linalg.qr(np.column_stack([data.matrix / lengths, data.torque]))[1])[: len(lengths)]
         tolerance = self.pull.size if self.pull.kind == "nominal" else WEAK_TOLERANCE
         rotors, ones = self._rotor_pull(to_values)
         factor = np.vstack([tolerance * triangle[:, :-1] * lengths @ to_values, rotors])
@@ -144,10 +144,6 @@ class PhysicalLeastSquares:
         rotors = nominal_rotors(self.structure) if self.pull.kind == "nominal" else []
         rows = [to_values[place] / inertia for place, inertia in rotors]
         return np.reshape(rows, (len(rows), to_values.shape[1])), np.ones(len(rows))
-
-
-def _qr_triangle(matrix: Array) -> Array:
-    return np.asarray(np.linalg.qr(matrix)[1])
 
 
 def _triangle_basis() -> Array:

@@ -81,7 +81,7 @@ def clearest_posture(arm: Arm, positions: Array) -> Array:
 def draw_arm(arm: Arm, position: Array, marks: Mapping[int, JointMark], whole: Sequence[str] = ()) -> Markup:
     """The arm as SVG. marks: by joint, from 1. whole: what concerns the robot as a whole."""
     bones = arm_skeleton(arm, position)
-    lines = {joint: _cause_lines(mark) for joint, mark in marks.items()}
+    lines = {joint: wrap_text(mark.text, PICTURE_WIDTH - NAMES_START - 2, CAUSE_SIZE) for joint, mark in marks.items()}
     notes = [line for text in whole for line in wrap_text(f"whole robot: {text}", PICTURE_WIDTH - 12, CAUSE_SIZE)]
     names_height = ROW_HEIGHT * len(arm) + CAUSE_HEIGHT * sum(map(len, lines.values()))
     room = max(MIN_ARM_HEIGHT, names_height)
@@ -94,7 +94,7 @@ def draw_arm(arm: Arm, position: Array, marks: Mapping[int, JointMark], whole: S
             flat.centres[index] * scale + shift,
             flat.axes[index],
             marks.get(index + 1),
-            scale * _largest_extent(flat.path),
+            scale * max(float(np.max(np.ptp(flat.path, axis=0))), MIN_LENGTH),
         )
         for index in reversed(range(len(arm)))
     )
@@ -129,10 +129,6 @@ def visible_extent(path: Array) -> float:
     """How much of the picture the corners (points, 2 or 3) take up: area or volume, about."""
     sizes = np.linalg.svd(path - path.mean(axis=0), compute_uv=False)
     return float(sizes[:2].prod() + np.ptp(path[:, 0]) * MIN_LENGTH)
-
-
-def _largest_extent(path: Array) -> float:
-    return max(float(np.max(np.ptp(path, axis=0))), MIN_LENGTH)
 
 
 def _fit_to_picture(path: Array, height: float) -> tuple[float, Array]:
@@ -187,11 +183,6 @@ def _draw_joint(centre: Array, axis: Array, mark: JointMark | None, size: float)
             stroke_dasharray=dash,
         )
     return out
-
-
-def _cause_lines(mark: JointMark) -> list[str]:
-    """The causes at a joint in lines that fit beside the arm."""
-    return wrap_text(mark.text, PICTURE_WIDTH - NAMES_START - 2, CAUSE_SIZE)
 
 
 def _draw_names(

@@ -137,8 +137,4 @@ def _millimetres(value: float, half: float) -> str:
 
 def _begin(sentence: str, doubtful: bool) -> str:
     """The sentence with its first letter large, or behind `Perhaps`."""
-    return f"Perhaps {sentence[0].lower()}{sentence[1:]}" if doubtful else _capitalise(sentence)
-
-
-def _capitalise(sentence: str) -> str:
-    return sentence[0].upper() + sentence[1:]
+    return f"Perhaps {sentence[0].lower()}{sentence[1:]}" if doubtful else (sentence[0].upper() + sentence[1:])

@@ -63,7 +63,7 @@ def fit_prediction(named: FittedModel) -> Prediction:
     candidates = [groups[number].candidate for number in more]
     candidates = [*(_of_found_size(named, number) for number in own), *candidates]
     start = tuple(range(len(own)))
-    own_design = _smaller_design(named, numbers)
+    own_design = replace(named.design, blocks=tuple(named.design.blocks[number] for number in numbers))
     suggested = max(suggested_cutoff(run) for run in identification_runs(named.design.observed))
     smooth = _design_at(named, candidates, min(suggested, named.design.observed.cutoff_hz), position_ratio=1.0)
     judge = _Judge.of(smooth if _has_rows(smooth.observed) else own_design)
@@ -144,11 +144,6 @@ def _lower_cutoffs(observed: Observed, suggested: float, tuning: PredictionTunin
     """Cut-offs below the present one, Hz. suggested: by the positions."""
     present = observed.cutoff_hz
     return [each * suggested for each in tuning.cutoff_shares if each * suggested < tuning.least_change * present]
-
-
-def _smaller_design(model: FittedModel, numbers: Sequence[int]) -> DesignMatrix:
-    """The design with some of its blocks."""
-    return replace(model.design, blocks=tuple(model.design.blocks[number] for number in numbers))
 
 
 def _design_at(

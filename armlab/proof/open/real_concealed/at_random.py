@@ -130,11 +130,7 @@ def write_random_case(reference: ReferenceModel, number: int, drawn: DrawnCase, 
     sought = () if drawn.case.control else sought_in_case(reference, drawn.case)
     joints = len(reference.recording.arm)
     truth = RandomTruth(drawn.case, number, joints, reference.description, drawn.strength, sought)
-    _truth_file(folder, key).write_text(json.dumps(asdict(truth), indent=1) + "\n", encoding="utf-8")
-
-
-def _truth_file(folder: Path, key: str) -> Path:
-    return folder / TRUTH / f"{key}.json"
+    (folder / TRUTH / f"{key}.json").write_text(json.dumps(asdict(truth), indent=1) + "\n", encoding="utf-8")
 
 
 def examine_observation(
