@@ -267,26 +267,7 @@ class EvidenceTuning:
         "widths of the links with which every effect has to pass, too: nobody knows that width",
         "of the widest link",
     )
-    min_excitation: float = tuned(
-        0.25,
-        "validation runs that excite an effect less may fail to profit from it",
-        "of the mean square in identification",
-    )
-    max_loss: float = tuned(
-        0.002, "growth that is allowed where validation excites an effect", "of the validation error"
-    )
-    max_loss_unexcited: float = tuned(
-        0.01,
-        "growth that is allowed where validation hardly excites an effect",
-        "of the validation error",
-        source="validation run of the UR10",
-    )
-    max_whitened_loss: float = tuned(
-        0.05,
-        "whitened loss in validation that is little where validation hardly excites an effect",
-        "of the gain in identification",
-    )
-    worse_level: float = tuned(0.99, "above it the loss in validation is sure", "one-sided p-value of a gain", most=1.0)
+    max_loss: float = tuned(0.002, "growth that an effect may cause", "of the error of validation runs")
     min_likelihood_ratio: float = tuned(
         20.0, "a law that stands for usual friction has to be so many times likelier than it", least=1.0
     )
@@ -316,11 +297,6 @@ class PruningTuning:
     )
     single_event_share: float = tuned(
         1 / 3, "gain of what happened once: it acts in a small part of the time", "of least_gain"
-    )
-    held_out_level: float = tuned(0.05, "level of the test that a held-out gain is sure", "one-sided p-value", most=1.0)
-    large_gain: float = tuned(0.2, "gain to which large_gain_level applies", "of the joint's held-out error")
-    large_gain_level: float = tuned(
-        0.2, "that level for a large gain, though a few stretches hold most of it", "one-sided p-value", most=1.0
     )
     max_cycles: int = tuned(3, "cycles of withdrawing and looking again", "cycles", least=1)
 

@@ -211,13 +211,12 @@ class HeldOutGain:
     """By how much squared held-out errors fall, a share of what is left of them, and one-sided p-values of that.
 
     p_value asks whether stretches of time profit alike: what a few of them hold may be a fault of theirs. chance asks
-    whether noise would make it. change: mean square of what the prediction changes by: how much the data excite it.
+    whether noise would make it.
     """
 
     share: float
     p_value: float
     chance: float
-    change: float
 
 
 def held_out_gain(without: Array, with_it: Array, blocks: NDArray[np.intp]) -> HeldOutGain:
@@ -236,4 +235,4 @@ def held_out_gain(without: Array, with_it: Array, blocks: NDArray[np.intp]) -> H
     noise = 2 * float(np.sqrt(carried @ carried))
     count = float(np.sum(power)) ** 2 / max(float(power @ power), 1e-300)
     chance = student_tail(gain / noise, count) if noise > 0 else 1.0
-    return HeldOutGain(gain / max(float(with_it @ with_it), 1e-300), p_value, chance, float(np.mean(predicted**2)))
+    return HeldOutGain(gain / max(float(with_it @ with_it), 1e-300), p_value, chance)

@@ -122,8 +122,8 @@ class Evidence:
     which the whitened held-out error of the joint that profits most falls, held_p: one-sided, of that fall; the better
     of validation runs and of identification stretches held out in turn. validation_gain: the share on validation runs.
     rms_before, rms_after: N m, of that joint on validation rows without and with it. score: what it adds to the score
-    of the model. objection: of physics. worse: whether validation runs are surely predicted worse. repeatable: False
-    for what happened once, in one stretch of one run: no other data can tell of it. usual: what every arm has.
+    of the model. objection: of physics. repeatable: False for what happened once, in one stretch of one run: no other
+    data can tell of it. usual: what every arm has.
     """
 
     joint: int
@@ -136,7 +136,6 @@ class Evidence:
     rms_after: float
     score: float
     objection: str | None = None
-    worse: bool = False
     repeatable: bool = True
     usual: bool = False
 
@@ -144,6 +143,10 @@ class Evidence:
     def fall(self) -> float:
         """By what share the RMS on validation rows falls."""
         return 1 - self.rms_after / self.rms_before if self.rms_before > 0 else 0.0
+
+    def is_refuted(self, tuning: EvidenceTuning) -> bool:
+        """Whether the error on validation rows grows by more than the allowed loss."""
+        return self.fall < -tuning.max_loss
 
 
 @dataclass(frozen=True, eq=False)
@@ -414,21 +417,7 @@ class Judge:
             before,
             after,
             score,
-            None,
-            _validation_refutes(validated, inside, after / before - 1 if before > 0 else 0.0, self.tuning),
         )
-
-
-def _validation_refutes(validated: HeldOutGain, inside: HeldOutGain, growth: float, tuning: EvidenceTuning) -> bool:
-    """Whether validation data speak against an effect: by not profiting although they excite it, or surely.
-
-    growth: of their error as it is, not whitened, as a share. A sure whitened loss that is little beside the gain in
-    identification, where they hardly excite it, is an effect whose form is not exact there.
-    """
-    if validated.change > tuning.min_excitation * inside.change:
-        return validated.share < 0 or growth > tuning.max_loss
-    large = validated.share < -tuning.max_whitened_loss * max(inside.share, 0.0)
-    return (large and validated.p_value > tuning.worse_level) or growth > tuning.max_loss_unexcited
 
 
 def count_looks(model: FittedModel) -> int:

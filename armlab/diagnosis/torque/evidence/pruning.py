@@ -36,16 +36,10 @@ def first_failed_test(evidence: Evidence, settings: Settings) -> FailedTest | No
     least = tuning.least_gain * (1.0 if evidence.repeatable else tuning.single_event_share)
     if guards.heldout_gain and gain < least:
         return FailedTest("held-out gain", f"held-out gain {100 * gain:.3g} %", gain, least, "pruning.least_gain")
-    if not evidence.repeatable:
-        return None
-    name = "large_gain_level" if gain > tuning.large_gain else "held_out_level"
-    level = tuning.large_gain_level if gain > tuning.large_gain else tuning.held_out_level
-    if guards.heldout_gain and not evidence.usual and evidence.held_p > level:
-        text = f"held-out gain not sure (p = {evidence.held_p:.2g})"
-        return FailedTest("p of the held-out gain", text, evidence.held_p, level, f"pruning.{name}", at_least=False)
-    if guards.heldout_gain and evidence.worse:
-        text = f"validation gets worse by {-100 * evidence.validation_gain:.2g} %"
-        return FailedTest("gain on validation runs", text, evidence.validation_gain, 0.0)
+    if guards.heldout_gain and evidence.repeatable and evidence.is_refuted(settings.tuning.evidence):
+        growth, most = -evidence.fall, settings.tuning.evidence.max_loss
+        text = f"the error of validation runs grows by {100 * growth:.2g} %"
+        return FailedTest("error of validation runs", text, growth, most, "evidence.max_loss", at_least=False)
     return None
 
 

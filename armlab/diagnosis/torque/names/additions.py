@@ -46,7 +46,7 @@ def add_probable(belief: Belief) -> Belief:
         certain = (
             evidence.score >= tuning.pruning.least_evidence
             and evidence.corrected <= tuning.pruning.level
-            and not evidence.worse
+            and not evidence.is_refuted(tuning.evidence)
         )
         what = _candidate(out.model, group)
         likeliest = naming.answers[0].is_of(what.effect, what.joint)

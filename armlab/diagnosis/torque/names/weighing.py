@@ -109,7 +109,7 @@ def weigh_addition(
         "left held-out chance": negative_logarithm(evidence.held_p, 6) / 6,
         "left gain": float(np.log1p(10 * max(evidence.gain, 0.0))),
         "left validated": float(np.clip(5 * evidence.validation_gain, -1, 1)),
-        "left worse": float(evidence.worse),
+        "left worse": float(evidence.is_refuted(model.design.settings.tuning.evidence)),
         "left colour": _colour(model, evidence.joint),
         "left structure": _structured_share(model, left, evidence.joint),
         "left structure chance": _structure_chance(left, evidence.joint),
