@@ -248,9 +248,6 @@ class EvidenceTuning:
 
     block_s: float = tuned(1.0, "length of the stretches of validation runs that are compared", "s", least=1e-3)
     min_blocks: int = tuned(12, "least number of these stretches", "stretches", least=2)
-    min_certain_share: float = tuned(
-        0.5, "a held-out gain at least so large may say that the gain is sure", "of the larger gain", most=1.0
-    )
     push_level: float = tuned(0.3, "rows above it belong to the push", "of a push's peak", most=0.99)
     min_push_s: float = tuned(0.15, "a push that is shorter in motion is a reversal", "s")
     min_push_moving_share: float = tuned(
@@ -262,15 +259,7 @@ class EvidenceTuning:
         "of the push's rows",
         most=1.0,
     )
-    wider_links_factor: float = tuned(
-        3.0,
-        "widths of the links with which every effect has to pass, too: nobody knows that width",
-        "of the widest link",
-    )
     max_loss: float = tuned(0.002, "growth that an effect may cause", "of the error of validation runs")
-    min_likelihood_ratio: float = tuned(
-        20.0, "a law that stands for usual friction has to be so many times likelier than it", least=1.0
-    )
 
 
 @dataclass(frozen=True)
@@ -294,9 +283,6 @@ class PruningTuning:
     )
     self_evident_gain: float = tuned(
         0.25, "gain that needs no other evidence for its name", "of the joint's held-out error"
-    )
-    single_event_share: float = tuned(
-        1 / 3, "gain of what happened once: it acts in a small part of the time", "of least_gain"
     )
     max_cycles: int = tuned(3, "cycles of withdrawing and looking again", "cycles", least=1)
 
@@ -432,13 +418,6 @@ class ClaimTuning:
         "a body at another link that predicts worse by less predicts as well",
         "of the held-out error, mean of the joints' logarithms",
     )
-    max_unnamed_gain: float = tuned(
-        0.25,
-        "more that parts without a claim explain, where nothing is claimed, makes a verdict inconclusive",
-        "of a joint's held-out error",
-        source="as pruning.self_evident_gain",
-        most=1.0,
-    )
     min_gap: float = tuned(0.02, "a smaller gap between error and noise cannot be measured", "of the noise floor")
 
 
@@ -487,36 +466,11 @@ class NamingTuning:
 class PlausibilityTuning:
     """When numbers that no engineer expects, or that are hardly known, withdraw a finding."""
 
-    certain_link_evidence: float = tuned(
-        60.0,
-        "with more a link is off for certain, though none of its ten numbers alone differs from zero",
-        "log evidence",
-        source="as pruning.least_evidence: joints feel sums of the numbers of links",
-    )
-
     overwhelming_evidence: float = tuned(
         600.0,
         "what a name with a parameter outside its plausible range adds to the log evidence",
         "log likelihood",
         source="ten times pruning.least_evidence: evidence counts structure that the library lacks, too",
-    )
-    overwhelming_gain: float = tuned(
-        0.25,
-        "gain on held-out data that such a name makes, too",
-        "of the joint's held-out error",
-        source="as pruning.self_evident_gain",
-    )
-    max_interval_ratio: float = tuned(
-        30.0,
-        "highest over lowest end of the interval of a positive parameter that is known",
-        source="development sets: 12 for a right finding; an interval of 94 % of the value to both sides has it",
-        least=1.0,
-    )
-    max_order_error: float = tuned(
-        0.5,
-        "half width of the interval of a wave's order",
-        "cycles over the joint's travel",
-        source="beyond half a cycle the wave at one end of the travel says nothing of that at the other",
     )
     max_unknown_ratio: float = tuned(
         0.5,

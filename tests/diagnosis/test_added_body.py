@@ -15,7 +15,7 @@ from armlab.diagnosis.torque.evidence.added_body import _fewer_off, _likeliest_b
 from armlab.diagnosis.torque.evidence.evidence import Evidence
 from armlab.diagnosis.torque.evidence.plausibility import _reason_other_mass, reason_link_unknown
 from armlab.diagnosis.torque.search.surrogate import Structure
-from armlab.diagnosis.tuning import PlausibilityTuning
+from armlab.diagnosis.tuning import Tuning
 from armlab.effects.links import BODY_SIZE_M, SolidBody
 from armlab.effects.parameters import ParameterValue
 from armlab.recordings.load import load_recording
@@ -118,7 +118,7 @@ def reason_beside(joint: int, size: float, depends_on: tuple[str, ...], link: in
     evidence = Evidence(1, 0.0, 0.0, 0.9, 0.0, 0.9, 9.0, 1.0, 500.0)
     load = Claim("payload", link, (link,), (), "", evidence, torque, candidate=SolidBody.of_body(ARM, link, BODY))
     left = Structure(joint - 1, 0.9, 1e-9, 0.9, 0.9, size * np.cos(np.linspace(0, 20, 500)), depends_on)
-    return reason_link_unknown(load, [left], PlausibilityTuning())
+    return reason_link_unknown(load, [left], Tuning())
 
 
 def test_a_load_is_not_told_beside_structure_as_large_as_its_own_torque() -> None:

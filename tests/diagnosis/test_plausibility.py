@@ -1,14 +1,12 @@
 """Numbers that no engineer believes, and intervals that say nothing, are no findings."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
 
-from armlab.common.arrays import Array
 from armlab.diagnosis.torque.evidence.plausibility import reason_implausible
-from armlab.diagnosis.tuning import PlausibilityTuning
 from armlab.effects.contract import Candidate
 from armlab.effects.friction import ViscousFriction
 from armlab.effects.memory import ViscousDrift
@@ -32,13 +30,9 @@ class SignalsStandIn:
 
 @dataclass(frozen=True)
 class ObservedStandIn:
-    """A recording at 1 kHz whose joints travel 2 rad."""
+    """A recording at 1 kHz."""
 
     signals: tuple[SignalsStandIn, ...] = (SignalsStandIn(),)
-    positions: Array = field(default_factory=lambda: np.array([[0.0] * 6, [2.0] * 6]))
-
-    def kept(self, signal: str) -> Array:
-        return self.positions
 
 
 def reason(
@@ -46,7 +40,7 @@ def reason(
 ) -> str | None:
     named = tuple(ParameterValue(name, value, interval, "") for name, value, interval in values)
     observed: Any = ObservedStandIn()
-    return reason_implausible(candidate, named, observed, known=known, exact=exact, tuning=PlausibilityTuning())
+    return reason_implausible(candidate, named, observed, known=known, exact=exact)
 
 
 def test_a_coefficient_that_may_be_zero_is_no_finding() -> None:
@@ -86,8 +80,7 @@ def test_a_drift_is_known_though_its_time_constant_is_not() -> None:
     assert reason(drift, ("time_constant", 600.0, (-50.0, 2000.0)), ("final", 3.0, (-40.0, 50.0))) is None
 
 
-def test_a_wave_of_unknown_order_or_phase_is_no_finding() -> None:
+def test_a_wave_of_unknown_phase_is_no_finding() -> None:
     ripple = TorqueRipple.at(ARM, 1, shape=(30.0,))
     assert "wider" in str(reason(ripple, ("order", 30.0, (29.9, 30.1)), ("phase", 0.0, (-3.0, 3.0))))
-    assert "cycles" in str(reason(ripple, ("order", 8.6, (6.0, 11.2)), ("phase", 0.0, (-0.1, 0.1))))
     assert reason(ripple, ("order", 30.0, (29.9, 30.1)), ("phase", 0.0, (-0.1, 0.1))) is None

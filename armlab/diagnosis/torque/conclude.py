@@ -51,7 +51,7 @@ from armlab.diagnosis.torque.search.fitted_model import (
 )
 from armlab.diagnosis.torque.search.search import Search
 from armlab.diagnosis.torque.search.surrogate import Structure
-from armlab.diagnosis.tuning import ClaimTuning, changed_numbers
+from armlab.diagnosis.tuning import PruningTuning, changed_numbers
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.recording import Recording
 
@@ -155,7 +155,7 @@ def _assemble(
     parts = tuple(replace(each, removal=as_found(each.removal, errors, observed)) for each in parts)
     claims = tuple(replace(each, removal=as_found(each.removal, errors, observed)) for each in claims)
     claims = with_minor_ones(claims, parts)
-    unnamed = _unnamed_gain(fits, tuning.claims) if not claims else None
+    unnamed = _unnamed_gain(fits, tuning.pruning) if not claims else None
     status: Status = "mismatch" if claims else "none" if unnamed is None else "inconclusive"
     base, covariance = prediction.model.base_parameters()
     return Diagnosis(
@@ -188,10 +188,10 @@ def _assemble(
     )
 
 
-def _unnamed_gain(fits: Sequence[JointFit], tuning: ClaimTuning) -> JointFit | None:
+def _unnamed_gain(fits: Sequence[JointFit], tuning: PruningTuning) -> JointFit | None:
     """The joint whose held-out error falls most with parts that are present and not claimed, where that is much."""
     worst = min(fits, key=lambda each: each.after / max(each.before, 1e-300))
-    return worst if worst.after < (1 - tuning.max_unnamed_gain) * worst.before else None
+    return worst if worst.after < (1 - tuning.self_evident_gain) * worst.before else None
 
 
 def _is_beaten_by(plain: Yardstick, prediction: Prediction) -> bool:

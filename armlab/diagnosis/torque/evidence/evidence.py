@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.common.probabilities import chi_square_tail
 from armlab.diagnosis.torque.columns.blocks import (
     BlockCovariance,
     Folds,
@@ -203,8 +202,8 @@ class Judge:
             candidate = solver.candidate(group)
             values = solver.values(fit, group)
             objection = solver.objection(group, values, self._covariance(fit, spread, group))
-            tested = max(self._tested(fit, spread, group), self._in_wider_links(group))
-            evidence = self._against(state.minus(group), (tested, self.looks(group)), candidate.rows, -losses[group])
+            tested = self._tested(fit, spread, group), self.looks(group)
+            evidence = self._against(state.minus(group), tested, candidate.rows, -losses[group])
             if self.simpler(group) and not self._in_place_of_usual(group):
                 evidence = self._beyond_usual(group)
             if group in self._best_formulas:
@@ -264,21 +263,6 @@ class Judge:
         own = groups[group].place
         return 2 * self.model.solver.places * sum(each.candidate.looks for each in groups if each.place == own)
 
-    def _in_wider_links(self, group: int) -> float:
-        """P-value of a group where the links may be off far more than was found; 0 for links as simulated.
-
-        The width of the links' errors is an estimate: what is significant with that width alone is not claimed.
-        """
-        solver, state = self.model.solver, self.state
-        if not state.widths or not any(state.widths):
-            return 0.0
-        width = self.tuning.wider_links_factor * max(state.widths)
-        wider = solver.fit(State(state.groups, (width,) * len(state.widths)))
-        values = wider.coefficients[solver.groups[group].columns]
-        place = self._place(wider, group)
-        block = wider.inverse[np.ix_(place, place)]
-        return chi_square_tail(float(values @ np.linalg.pinv(block, hermitian=True) @ values), int(solver.ranks[group]))
-
     def _pushed(self, group: int) -> str | None:
         """Against a push: see `reason_no_contact`."""
         model, design = self.model, self.model.design
@@ -310,7 +294,7 @@ class Judge:
         return set(self.simpler(group)) if formula is None else set(formula.groups) - set(self.state.groups)
 
     def _in_place_of_usual(self, group: int) -> bool:
-        """Whether one law stands where usual friction would need as many numbers, and is surely likelier than that.
+        """Whether one law stands where usual friction would need as many numbers, and is likelier than that.
 
         A law without nonlinear parameters is usual friction by direction; it is compared as other special laws are.
         """
@@ -320,14 +304,14 @@ class Judge:
         if not candidate.shape or set(simpler) & set(state.groups) or numbers > solver.ranks[list(simpler)].sum():
             return False
         usual = State(tuple(sorted({*state.minus(group).groups, *simpler})), state.widths)
-        return solver.fit(state).score > solver.fit(usual).score + float(np.log(self.tuning.min_likelihood_ratio))
+        return solver.fit(state).score > solver.fit(usual).score
 
     def _beyond_usual(self, group: int) -> Evidence:
         """The evidence against usual friction in the place of one special law, and of all at this joint."""
         groups, state = self.model.solver.groups, self.state
         joint, simpler = groups[group].candidate.joint, self.simpler(group)
         special = [each for each in state.groups if groups[each].candidate.joint == joint and self.simpler(each)]
-        tested = max(self._beyond(group, simpler), self._in_wider_links(group)), self.looks(group)
+        tested = self._beyond(group, simpler), self.looks(group)
         found = list[Evidence]()
         for taken in ([group], special):
             less = State(tuple(sorted({*state.groups, *simpler} - set(taken))), state.widths)
@@ -401,8 +385,6 @@ class Judge:
         joint = max(gains, key=lambda each: max(gains[each], key=lambda gain: gain.share).share)
         validated, inside = gains[joint]
         best = validated if validated.share >= inside.share else inside
-        certain = min(self.tuning.min_certain_share * best.share, best.share)
-        held_p = min(each.p_value for each in (validated, inside) if each.share >= certain)
         p_value, looks = tested
         corrected = min(1.0, p_value * (looks if self.model.design.settings.guards.correction else 1))
         before = self.compared.validation_rms(less, joint)
@@ -412,7 +394,7 @@ class Judge:
             p_value,
             corrected,
             best.share,
-            held_p,
+            best.p_value,
             validated.share,
             before,
             after,

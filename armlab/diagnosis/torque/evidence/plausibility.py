@@ -2,7 +2,7 @@
 
 What an effect's parameters are on arms stands on the effect (`Parameter.plausible`, with its source). A law that fits
 with other numbers stands for structure that the library lacks, unless the evidence is overwhelming. An interval that
-holds zero, several orders of magnitude or a whole circle is no knowledge of a parameter.
+holds zero or a whole circle is no knowledge of a parameter.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ from armlab.diagnosis.torque.rows.data import Observed
 from armlab.diagnosis.torque.search.fitted_model import FittedModel
 from armlab.diagnosis.torque.search.search import FailedTest, Step
 from armlab.diagnosis.torque.search.surrogate import Structure
-from armlab.diagnosis.tuning import PlausibilityTuning
+from armlab.diagnosis.tuning import Tuning
 from armlab.effects.contract import Candidate, Kind, Parameter
 from armlab.effects.links import SolidBody
 from armlab.effects.parameters import ParameterValue, parameter_values
@@ -92,7 +92,7 @@ def doubtful_names(
     if not effects or not model.design.settings.guards.physics_signs:
         return {}
     wide, observed = extend_with_shapes(model), model.design.observed
-    tuning = model.design.settings.tuning.plausibility
+    tuning = model.design.settings.tuning
     out = {}
     for group, evidence in effects.items():
         coefficients = model.solver.values(model.fit, group)
@@ -101,8 +101,9 @@ def doubtful_names(
         values = parameter_values(candidate, coefficients, covariance, wide.factor)
         if model.solver.simulated[group].any():
             values = tuple(map(_as_difference, values))
-        known = evidence.score >= tuning.overwhelming_evidence and evidence.gain >= tuning.overwhelming_gain
-        reason = reason_implausible(candidate, values, observed, known=known, exact=exact, tuning=tuning)
+        known = evidence.gain >= tuning.pruning.self_evident_gain
+        known &= evidence.score >= tuning.plausibility.overwhelming_evidence
+        reason = reason_implausible(candidate, values, observed, known=known, exact=exact)
         if len(coefficients) == 1 and abs(coefficients[0]) <= wide.factor * np.sqrt(covariance[0, 0]):
             reason = reason or "its size may be zero"
         if reason is not None:
@@ -131,7 +132,7 @@ def links_that_data_tell(
     """
     kept, steps = [], list(model.steps)
     for each in claims:
-        reason = reason_link_unknown(each, left, model.design.settings.tuning.plausibility)
+        reason = reason_link_unknown(each, left, model.design.settings.tuning)
         reason = reason or _reason_other_mass(model, each)
         if reason is None:
             kept.append(each)
@@ -141,11 +142,11 @@ def links_that_data_tell(
     return replace(model, steps=tuple(steps)), tuple(kept)
 
 
-def reason_link_unknown(claim: Claim, left: Sequence[Structure], tuning: PlausibilityTuning) -> str | None:
+def reason_link_unknown(claim: Claim, left: Sequence[Structure], tuning: Tuning) -> str | None:
     """Why these data do not tell of a claim about a link or its load; None where they do, and for other claims."""
     if claim.candidate is None or claim.candidate.facts.where != "link":
         return None
-    if claim.in_links and claim.evidence.score < tuning.certain_link_evidence and not _differs_from_zero(claim):
+    if claim.in_links and claim.evidence.score < tuning.pruning.least_evidence and not _differs_from_zero(claim):
         return "no parameter differs from zero"
     best, link = claim.evidence.joint, claim.candidate.joints[0]
     for each in left:
@@ -155,7 +156,7 @@ def reason_link_unknown(claim: Claim, left: Sequence[Structure], tuning: Plausib
             return f"what is left without a name at joint {each.joint + 1} may be of a body that a later link carries"
         own, unknown = (float(np.std(of)) for of in (claim.prediction[:, each.joint], each.prediction))
         is_felt = own > ROUNDING * float(np.std(claim.prediction[:, best]))
-        if is_felt and unknown > tuning.max_unknown_ratio * own:
+        if is_felt and unknown > tuning.plausibility.max_unknown_ratio * own:
             share = format(unknown / own, ".2g")
             return (
                 f"what is left without a name at joint {each.joint + 1} is {share} times as large as its torque there"
@@ -194,7 +195,6 @@ def reason_implausible(
     *,
     known: bool,
     exact: bool,
-    tuning: PlausibilityTuning,
 ) -> str | None:
     """Why these parameters are not believed, in a few words; None where they are.
 
@@ -208,10 +208,8 @@ def reason_implausible(
         if parameter is None or isinstance(each.value, tuple):
             continue
         reason = None if exact else _reason_below_sampling(parameter, each.value, observed)
-        reason = reason or _reason_unknown(parameter, each, tuning)
+        reason = reason or _reason_unknown(parameter, each)
         reason = reason or (None if known else _reason_out_of_range(parameter, each, kind))
-        if candidate.facts.axis == "cycle" and each.name == "order":
-            reason = reason or _reason_order_unknown(each, _travel(candidate, observed), tuning)
         if reason is not None:
             return reason
     return None
@@ -224,8 +222,8 @@ def _reason_below_sampling(parameter: Parameter, value: float, observed: Observe
     return f"{parameter.name} {value:.3g}: less than one sampling interval ({interval:.3g} s) is how a log is made"
 
 
-def _reason_unknown(parameter: Parameter, each: ParameterValue, tuning: PlausibilityTuning) -> str | None:
-    """An interval that holds zero, spans orders of magnitude or is too wide for its parameter."""
+def _reason_unknown(parameter: Parameter, each: ParameterValue) -> str | None:
+    """An interval that holds zero or is too wide for its parameter."""
     if parameter.detail:
         return None
     ends = _interval(each)
@@ -237,8 +235,6 @@ def _reason_unknown(parameter: Parameter, each: ParameterValue, tuning: Plausibi
         return f"{shown}: wider than {parameter.max_width:.3g} says nothing"
     if parameter.positive and low <= 0:
         return f"{shown}: it may be zero"
-    if parameter.positive and high > tuning.max_interval_ratio * low:
-        return f"{shown}: not even its order of magnitude is known"
     return None
 
 
@@ -252,19 +248,6 @@ def _reason_out_of_range(parameter: Parameter, each: ParameterValue, kind: Kind)
         return None
     usual = f"{lowest:.3g} to {highest:.3g} {each.unit} ({parameter.plausible.source})"
     return f"{each.name} {each.value:.3g} {each.unit} is not plausible: {usual}"
-
-
-def _reason_order_unknown(each: ParameterValue, travel: float, tuning: PlausibilityTuning) -> str | None:
-    """An order that leaves the wave open over the travel, rad (m)."""
-    ends = _interval(each)
-    cycles = np.inf if ends is None else (ends[1] - ends[0]) / 2 * travel / (2 * np.pi)
-    if cycles <= tuning.max_order_error:
-        return None
-    return f"{each.name} is known to {cycles:.2g} cycles over the travel of the joint"
-
-
-def _travel(candidate: Candidate, observed: Observed) -> float:
-    return float(np.ptp(observed.kept("position")[:, candidate.rows[0]]))
 
 
 def _interval(each: ParameterValue) -> tuple[float, float] | None:

@@ -33,9 +33,9 @@ def first_failed_test(evidence: Evidence, settings: Settings) -> FailedTest | No
     if not evidence.usual and score < tuning.least_evidence and gain < tuning.self_evident_gain:
         text = f"log evidence {score:.0f}, too little for a name of {100 * gain:.3g} % held-out gain"
         return FailedTest("log evidence", text, score, tuning.least_evidence, "pruning.least_evidence")
-    least = tuning.least_gain * (1.0 if evidence.repeatable else tuning.single_event_share)
-    if guards.heldout_gain and gain < least:
-        return FailedTest("held-out gain", f"held-out gain {100 * gain:.3g} %", gain, least, "pruning.least_gain")
+    if guards.heldout_gain and gain < tuning.least_gain:
+        text = f"held-out gain {100 * gain:.3g} %"
+        return FailedTest("held-out gain", text, gain, tuning.least_gain, "pruning.least_gain")
     if guards.heldout_gain and evidence.repeatable and evidence.is_refuted(settings.tuning.evidence):
         growth, most = -evidence.fall, settings.tuning.evidence.max_loss
         text = f"the error of validation runs grows by {100 * growth:.2g} %"
