@@ -12,7 +12,7 @@ from armlab.common.errors import InputError
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.settings import suggest_name
 from armlab.common.tuning import TuningValue, tuned
-from armlab.diagnosis.motion.tuning import MotionTuning
+from armlab.diagnosis.motion.motion_tuning import MotionTuning
 from armlab.recordings.reading.tuning import ReadingTuning
 
 EVIDENCE_SOURCE = "fourth judged set: a quarter of the names below it were wrong in the clean tier"

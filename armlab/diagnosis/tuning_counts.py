@@ -57,5 +57,5 @@ def _attributes(tree: ast.Module) -> Iterator[str]:
 
 
 def _trees(folder: Path) -> Iterator[ast.Module]:
-    files = (each for each in sorted(folder.rglob("*.py")) if each.name != "tuning.py")
+    files = (each for each in sorted(folder.rglob("*.py")) if not each.name.endswith("tuning.py"))
     return (ast.parse(each.read_text(encoding="utf-8")) for each in files)

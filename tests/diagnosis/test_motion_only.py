@@ -28,12 +28,12 @@ from armlab.diagnosis.motion.held_out import JointTrials, replay_named, replays_
 from armlab.diagnosis.motion.hold import hold_commands
 from armlab.diagnosis.motion.joint_replay import joint_errors, replay_joint
 from armlab.diagnosis.motion.motion_result import MotionDiagnosis, ServoFinding
+from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.replay import joint_rms, replay
 from armlab.diagnosis.motion.separate import confused_parameters
 from armlab.diagnosis.motion.servo import NEUTRAL, PARAMETERS, USUAL, Key, Servos, place
 from armlab.diagnosis.motion.servo_simulation import ServoSimulation, read_servo_simulation
 from armlab.diagnosis.motion.shared_number import COMMON_DELAY, TOOL_MASS, JointModel, estimate_shared, weigh
-from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, make_windows
 from armlab.identification.model_file import read_model
 from armlab.recordings.motion import load_motion_recording

@@ -13,9 +13,9 @@ from armlab.cli.main import main
 from armlab.common.errors import InputError
 from armlab.diagnosis.motion.diagnose_motion import diagnose_motion
 from armlab.diagnosis.motion.motion_result import MotionDiagnosis
+from armlab.diagnosis.motion.motion_tuning import DEFAULT
 from armlab.diagnosis.motion.replay import joint_rms
 from armlab.diagnosis.motion.servo import place
-from armlab.diagnosis.motion.tuning import DEFAULT
 from armlab.proof.open.motion.peer import WINDOWS, PeerComparison, compare_with_sysid, import_sysid, servo_task
 from armlab.proof.open.motion.public_servos import peer_section
 from armlab.recordings.motion import load_motion_recording

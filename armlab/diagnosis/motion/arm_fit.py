@@ -18,9 +18,9 @@ from armlab.diagnosis.motion.choose import ChosenServo, choose_servo, free_at_fi
 from armlab.diagnosis.motion.couple import coupled_windows
 from armlab.diagnosis.motion.estimate import begin_integrals, fit_servo, settle, thin_windows, to_coordinates
 from armlab.diagnosis.motion.joint_replay import joint_errors
+from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.servo import LOWEST, OPTIONAL, USUAL, place
 from armlab.diagnosis.motion.servo_simulation import ServoSimulation
-from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 from armlab.recordings.recording import MotionRun
 

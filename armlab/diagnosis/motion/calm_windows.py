@@ -19,8 +19,8 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.motion.choose import ChosenServo, choose_limits, choose_servo
 from armlab.diagnosis.motion.estimate import correlated_variances, settle
 from armlab.diagnosis.motion.joint_replay import joint_errors
+from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.servo import LIMITS, place
-from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 
 

@@ -44,6 +44,7 @@ from armlab.diagnosis.motion.estimate import (
     with_nominal,
 )
 from armlab.diagnosis.motion.joint_replay import joint_errors
+from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.servo import (
     INFINITE_LIMIT,
     KEYS,
@@ -53,7 +54,6 @@ from armlab.diagnosis.motion.servo import (
     USUAL,
     place,
 )
-from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 
 LIMIT_SLOPE = place("limit_slope")

@@ -27,9 +27,9 @@ from armlab.diagnosis.motion.estimate import (
     with_damping_inside,
 )
 from armlab.diagnosis.motion.joint_replay import joint_errors
+from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.servo import HIGHEST, LOWEST, PARAMETERS, ServoParameter, place
 from armlab.diagnosis.motion.servo_simulation import read_servo_simulation
-from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, make_windows
 from armlab.recordings.motion import MotionRecording
 from problem.arm import Arm

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.estimate import settle
 from armlab.diagnosis.motion.joint_replay import FARTHEST, joint_errors, replay_arm
+from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.servo import PARAMETERS, place
 from armlab.diagnosis.motion.servo_simulation import ServoSimulation
-from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import (
     Windows,
     even_time,

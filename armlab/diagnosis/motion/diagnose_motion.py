@@ -34,6 +34,7 @@ from armlab.diagnosis.motion.held_out import (
 )
 from armlab.diagnosis.motion.hold import hold_commands, holds_samples
 from armlab.diagnosis.motion.motion_result import MotionDiagnosis, ReplayError, ServoFinding, Status
+from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.replay import replay, tool_rms
 from armlab.diagnosis.motion.second_thoughts import place_damping, with_stated_scale, without_worse
 from armlab.diagnosis.motion.servo import PARAMETERS
@@ -46,7 +47,6 @@ from armlab.diagnosis.motion.shared_number import (
     weigh,
     with_more,
 )
-from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, make_windows, window_stretches
 from armlab.diagnosis.motion.witness import correlate_currents
 from armlab.recordings.motion import MotionRecording

@@ -12,6 +12,7 @@ from armlab.diagnosis.motion.choose import TESTS_OF_GAIN, ChosenServo, GainOfNum
 from armlab.diagnosis.motion.estimate import rms_of
 from armlab.diagnosis.motion.held_out import command_error, settled_errors
 from armlab.diagnosis.motion.motion_result import ServoFinding
+from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.separate import TORQUE_SCALED, confused_parameters, has_weak_load
 from armlab.diagnosis.motion.servo import PARAMETERS, ServoParameter, place
 from armlab.diagnosis.motion.servo_simulation import ServoSimulation
@@ -23,7 +24,6 @@ from armlab.diagnosis.motion.shared_number import (
     estimate_shared,
     with_more,
 )
-from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 
 

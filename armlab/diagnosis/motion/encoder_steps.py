@@ -14,7 +14,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.estimate import ServoFit, fit_servo, to_coordinates, with_nominal
 from armlab.diagnosis.motion.joint_replay import joint_errors, replay_joint
-from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
+from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, read_in_steps
 
 

@@ -11,6 +11,7 @@ from armlab.diagnosis.motion.choose import ChosenServo
 from armlab.diagnosis.motion.estimate import rms_of, settle
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.motion_result import MotionDiagnosis, ReplayError, ServoFinding
+from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay
 from armlab.diagnosis.motion.servo import Servos
 from armlab.diagnosis.motion.servo_simulation import ServoSimulation
@@ -18,7 +19,6 @@ from armlab.diagnosis.motion.shared_number import (
     TOOL_MASS,
     with_more,
 )
-from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, smallest_step, window_stretches
 from armlab.recordings.recording import MotionRun
 

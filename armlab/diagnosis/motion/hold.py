@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.estimate import settle
 from armlab.diagnosis.motion.joint_replay import joint_errors
+from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.servo_simulation import ServoSimulation
-from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, make_windows, mean_command
 from armlab.recordings.recording import MotionRun
 

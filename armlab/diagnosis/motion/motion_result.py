@@ -7,10 +7,10 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.choose import ChosenServo
+from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.replay import Replayed
 from armlab.diagnosis.motion.servo import ServoParameter, Servos
 from armlab.diagnosis.motion.servo_simulation import ServoSimulation
-from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.witness import CurrentWitness
 from armlab.recordings.motion import MotionRecording
 

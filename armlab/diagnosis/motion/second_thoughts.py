@@ -10,9 +10,9 @@ from armlab.diagnosis.motion.choose import ChosenServo, judge_again
 from armlab.diagnosis.motion.estimate import rms_of, thin_windows
 from armlab.diagnosis.motion.held_out import rise_of, settled_errors, stretch_squares
 from armlab.diagnosis.motion.joint_replay import joint_errors
+from armlab.diagnosis.motion.motion_tuning import MotionTuning
 from armlab.diagnosis.motion.separate import TORQUE_SCALED, has_weak_load
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, KEYS, OPTIONAL, place
-from armlab.diagnosis.motion.tuning import MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 
 

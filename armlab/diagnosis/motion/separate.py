@@ -8,8 +8,8 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.estimate import ServoFit, jacobian
+from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, OPTIONAL, SHARED, USUAL, place
-from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 
 # one factor for all of them, and for the inertia

@@ -43,9 +43,9 @@ from armlab.diagnosis.motion.choose import (
 from armlab.diagnosis.motion.couple import coupled_windows
 from armlab.diagnosis.motion.encoder_steps import replay_in_steps
 from armlab.diagnosis.motion.estimate import evenly_spread, fit_servo, price_of_number, reading_noise
+from armlab.diagnosis.motion.motion_tuning import MotionTuning
 from armlab.diagnosis.motion.servo import place
 from armlab.diagnosis.motion.servo_simulation import ServoSimulation
-from armlab.diagnosis.motion.tuning import MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 from armlab.recordings.recording import MotionRun
 

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from armlab.common.arrays import Array
+from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.servo import place
 from armlab.diagnosis.motion.servo_simulation import ServoSimulation
-from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.recordings.recording import MotionRun
 from problem.arm import Arm
 from problem.drive_torque import position_torque

@@ -21,7 +21,7 @@ from armlab.diagnosis.formats import (
 )
 from armlab.diagnosis.motion.compare import MotionComparison, ServoChange, compare_motion
 from armlab.diagnosis.motion.compare_load import compare_load
-from armlab.diagnosis.motion.tuning import DEFAULT
+from armlab.diagnosis.motion.motion_tuning import DEFAULT
 from armlab.effects.library import effect_named
 from armlab.recordings.motion import load_motion_recording
 from armlab.report.changes.comparison_report import write_comparison

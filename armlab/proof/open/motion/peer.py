@@ -26,11 +26,11 @@ from armlab.common.packages import install_line
 from armlab.diagnosis.motion.diagnose_motion import split_runs
 from armlab.diagnosis.motion.estimate import LOGARITHMIC, find_start, from_coordinates, to_coordinates
 from armlab.diagnosis.motion.motion_result import MotionDiagnosis
+from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.replay import Replayed, replay, with_servos
 from armlab.diagnosis.motion.servo import HIGHEST, KEYS, LOWEST, SCALE, Servos
 from armlab.diagnosis.motion.servo_plugin import STICKING
 from armlab.diagnosis.motion.servo_simulation import ServoSimulation, actuator_of
-from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import held_command, make_windows, smooth_motion, window_stretches
 from armlab.recordings.recording import MotionRun
 from problem.mjcf import import_mujoco
