@@ -8,7 +8,7 @@ DECLARED = """
 typedef struct {
     double stiffness, damping, gap;
 } DriveTrain;
-void twist_of_drive_train(const DriveTrain *train, int64_t samples, double interval, int half_steps,
+void twists_of_drive_trains(int trains, const DriveTrain *train, int64_t samples, double interval, int half_steps,
     const double *load, const double *inertia, const double *by_speed, const double *by_angle, double *out);
 """
 

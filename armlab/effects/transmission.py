@@ -94,19 +94,28 @@ def felt_inertia(scene: Scene, joint: int) -> Array:
 
 def integrate_twist(scene: Scene, joint: int, law: Twist) -> Array:
     """Twist of a joint (from 0), its speed and its acceleration, (3, samples); at rest with its load at the start."""
-    slow = 0.0 if law.gap > 0 else law.stiffness / (2 * np.pi * MAX_RESONANCE_HZ) ** 2
+    return np.asarray(integrate_twists(scene, joint, [law])[0])
+
+
+def integrate_twists(scene: Scene, joint: int, laws: Sequence[Twist]) -> Array:
+    """The same of several gaps, or of one spring, side by side: (laws, 3, samples)."""
+    first = laws[0]
+    slow = 0.0 if first.gap > 0 else first.stiffness / (2 * np.pi * MAX_RESONANCE_HZ) ** 2
     inertia = np.maximum(felt_inertia(scene, joint), slow)
     load = np.ascontiguousarray(scene.rigid_torque[:, joint])
     wall = 2 * np.pi * WALL_HZ
-    stiffness, damping = (wall**2, 2 * wall) if law.gap > 0 else (law.stiffness, law.damping_time * law.stiffness)
-    train = ffi.new("DriveTrain *", [stiffness, damping, law.gap])
-    by_angle, by_speed = _load_slopes(scene, joint, inertia, stiffness * inertia if law.gap > 0 else stiffness)
-    out = np.empty((3, len(load)))
-    lib.twist_of_drive_train(
-        train,
+    stiffness, damping = (
+        (wall**2, 2 * wall) if first.gap > 0 else (first.stiffness, first.damping_time * first.stiffness)
+    )
+    trains = ffi.new("DriveTrain[]", [[stiffness, damping, law.gap] for law in laws])
+    by_angle, by_speed = _load_slopes(scene, joint, inertia, stiffness * inertia if first.gap > 0 else stiffness)
+    out = np.empty((len(laws), 3, len(load)))
+    lib.twists_of_drive_trains(
+        len(laws),
+        trains,
         len(load),
         scene.step,
-        _half_steps(scene, law, inertia),
+        _half_steps(scene, first, inertia),
         pointer(load),
         pointer(np.ascontiguousarray(inertia)),
         pointer(by_speed),
@@ -145,6 +154,7 @@ GAPS = (1e-4, 6e-4, 4e-3)  # rad, for a first look
 GAP_RANGE = (1e-5, 5e-2)
 SCANNED_GAPS = np.geomspace(2e-5, 2e-2, 32)
 KEPT_GAPS = 2  # gaps of a scan
+SIDE_BY_SIDE = 8  # gaps that are integrated at a time, as many as there are lanes in drive_train.c
 
 
 @dataclass(frozen=True)
@@ -402,18 +412,19 @@ def recorded_difference(scene: Scene, joint: int) -> Array | None:
     return None if np.isnan(difference).any() else np.asarray(difference - difference.mean())
 
 
-def _resemblance(
-    shapes: Sequence[Transmission], scenes: Sequence[Scene], residuals: Sequence[Array], joint: int
-) -> Array:
+def _resemblance(shapes: Sequence[Backlash], scenes: Sequence[Scene], residuals: Sequence[Array], joint: int) -> Array:
     """Share of what is left at a joint (from 0) that each shape explains there, by the inertia of the twist alone."""
     products = np.zeros((3, len(shapes)))
     for scene, residual in zip(scenes, residuals, strict=True):
         rows = np.flatnonzero(np.isfinite(residual[:, joint]))
         left, inertia = residual[rows, joint], felt_inertia(scene, joint)
         width = max(int(np.median(np.diff(rows))), 1) if len(rows) > 1 else 1
-        for place, shape in enumerate(shapes):
-            torque = np.convolve(inertia * shape.twist(scene)[2], np.full(width, 1 / width), "same")[rows]
-            products[:, place] += torque @ left, torque @ torque, left @ left
+        for start in range(0, len(shapes), SIDE_BY_SIDE):
+            laws, gaps = zip(*(shape.law for shape in shapes[start : start + SIDE_BY_SIDE]), strict=True)
+            twists = integrate_twists(scene, joint, laws)
+            for place, (twist, gap) in enumerate(zip(twists, gaps, strict=True), start):
+                torque = np.convolve(inertia * (twist[2] / gap), np.full(width, 1 / width), "same")[rows]
+                products[:, place] += torque @ left, torque @ torque, left @ left
     return np.asarray(np.maximum(products[0], 0) ** 2 / np.maximum(products[1] * products[2], 1e-300))
 
 
