@@ -58,6 +58,20 @@ class Fit:
     inverse: Array
 
 
+@dataclass(frozen=True, eq=False)
+class LinkColumns:
+    """Links' errors in the normal equations. factor: (base, rank). products: with all columns, (rank, size + 1).
+
+    own: with each other, the prior's precision added, (rank, rank). price: of a score.
+    """
+
+    factor: Array
+    products: Array
+    own: Array
+    precision: float
+    price: float
+
+
 class Solver:
     """Solves and scores states. groups: of the columns. prior: None where there is no nominal model.
 
@@ -79,7 +93,7 @@ class Solver:
         self.moments, self.groups, self.base, self.prior, self.places = moments, groups, base, prior, places
         self.simulated, self.tuning = simulated, tuning
         self.precisions = self._precisions(scales)
-        self._links: dict[Widths | None, tuple[Array, Array, float, float]] = {}
+        self._links: dict[Widths | None, LinkColumns] = {}
         self._fits: dict[State, Fit] = {}  # those that were asked for last
         self._held: dict[State, Fit] = {}
         self._contained: dict[int, tuple[int, ...]] = {}
@@ -130,9 +144,12 @@ class Solver:
     def replaces(self) -> NDArray[np.bool_]:
         """Which groups take the place of which others at their joint, (groups, groups)."""
         out = np.zeros((len(self.groups), len(self.groups)), dtype=bool)
+        numbers: dict[tuple[str, int | None], list[int]] = {}
         for number, candidate in enumerate(each.candidate for each in self.groups):
-            for other, replaced in enumerate(each.candidate for each in self.groups if candidate.replaces):
-                out[number, other] = replaced.effect in candidate.replaces and replaced.joint == candidate.joint
+            numbers.setdefault((candidate.effect, candidate.joint), []).append(number)
+        for number, candidate in enumerate(each.candidate for each in self.groups):
+            for effect in candidate.replaces:
+                out[number, numbers.get((effect, candidate.joint), [])] = True
         return out
 
     def contained(self, number: int) -> tuple[int, ...]:
@@ -154,27 +171,28 @@ class Solver:
         """How many unusual effects there are."""
         return int(np.sum(self.unusual[list(groups)]))
 
-    def links(self, widths: Widths | None) -> tuple[Array, Array, float, float]:
-        """Factor (base, rank), its products with all columns (rank, size + 1), own precision, and the price."""
+    def links(self, widths: Widths | None) -> LinkColumns:
+        """The links' errors as columns of the normal equations."""
         if widths not in self._links:
             self._links[widths] = self._linked(widths)
         return self._links[widths]
 
-    def _linked(self, widths: Widths | None) -> tuple[Array, Array, float, float]:
+    def _linked(self, widths: Widths | None) -> LinkColumns:
         gram, base = self.moments.gram, self.base
         if widths is None or self.prior is None:
-            factor, precision = np.eye(base), 10 * self.tuning.ridge
-            return factor, gram[:base], precision, 0.0
+            precision = 10 * self.tuning.ridge
+            return LinkColumns(np.eye(base), gram[:base], gram[:base, :base] + precision * np.eye(base), precision, 0.0)
         if not any(widths):
-            return np.empty((base, 0)), np.empty((0, len(gram))), 1.0, 0.0
+            return LinkColumns(np.empty((base, 0)), np.empty((0, len(gram))), np.empty((0, 0)), 1.0, 0.0)
         factor = self.prior.factor(widths, self.moments.lengths[:base])
         products = factor.T @ gram[:base]
         inner = products[:, :base] @ factor
-        occam = 0.5 * float(np.linalg.slogdet(np.eye(len(inner)) + inner)[1])
+        own = np.eye(len(inner)) + inner
+        occam = 0.5 * float(np.linalg.slogdet(own)[1])
         sizes = {width for width in widths if width}
         some = sum(1 for width in widths if width) if len(set(widths)) > 1 else 0
         price = 0.5 * len(sizes) * np.log(sum(self.moments.rows)) + some * np.log(self.places)
-        return factor, products, 1.0, occam + float(price)
+        return LinkColumns(factor, products, own, 1.0, occam + float(price))
 
     def fit(self, state: State) -> Fit:
         """The fit of a state, kept for the next question."""
@@ -202,23 +220,25 @@ class Solver:
 
     def system(self, state: State) -> tuple[Array, NDArray[np.intp]]:
         """Matrix of the normal equations, and the effects' columns."""
-        gram = self.moments.gram
-        factor, products, precision, _ = self.links(state.widths)
-        columns, rank = self._columns(state), factor.shape[1]
+        links, columns = self.links(state.widths), self._columns(state)
+        rank = len(links.own)
         matrix = np.empty((rank + len(columns), rank + len(columns)))
-        matrix[:rank, :rank] = products[:, : self.base] @ factor + precision * np.eye(rank)
-        matrix[:rank, rank:] = products[:, columns]
+        matrix[:rank, :rank] = links.own
+        matrix[:rank, rank:] = links.products[:, columns]
         matrix[rank:, :rank] = matrix[:rank, rank:].T
-        matrix[rank:, rank:] = gram[np.ix_(columns, columns)] + np.diag(self.precisions[columns])
+        matrix[rank:, rank:] = self.moments.gram[np.ix_(columns, columns)]
+        at = np.arange(rank, len(matrix))
+        matrix[at, at] += self.precisions[columns]
         return matrix, columns
 
     def products(self, state: State) -> Array:
         """Products of what a state has in its normal equations with all columns and the torque."""
-        return np.vstack([self.links(state.widths)[1], self.moments.gram[self._columns(state)]])
+        return np.vstack([self.links(state.widths).products, self.moments.gram[self._columns(state)]])
 
     def _fitted(self, state: State) -> Fit:
         matrix, columns = self.system(state)
-        factor, _, _, price = self.links(state.widths)
+        links = self.links(state.widths)
+        factor, price = links.factor, links.price
         coefficients = np.zeros(self.moments.size)
         chi_square, inverse = 0.0, np.empty((0, 0))
         if len(matrix):

@@ -95,7 +95,7 @@ def fit_body(model: FittedModel, without: State, group: int, link: int) -> Place
     own = scaled @ ten
     coefficients = np.zeros(model.moments.size)
     others = solved[:, -1] - solved[:, columns] @ own
-    factor = solver.links(without.widths)[0]
+    factor = solver.links(without.widths).factor
     coefficients[: solver.base] = factor @ others[: factor.shape[1]]
     coefficients[other_columns] = others[factor.shape[1] :]
     coefficients[columns] = own

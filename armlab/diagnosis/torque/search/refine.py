@@ -123,9 +123,8 @@ def _unit_cube_maps(
 
 def prior_precision(solver: Solver, fit: Fit, size: int) -> Array:
     """Prior precision of a fit's parameters, the links' first, then the effects', (size, size)."""
-    _, _, precision, _ = solver.links(fit.state.widths)
     links = fit.links.shape[1]
     diagonal = np.zeros(size)
-    diagonal[:links] = precision
+    diagonal[:links] = solver.links(fit.state.widths).precision
     diagonal[links : links + len(fit.columns)] = solver.precisions[fit.columns]
     return np.diag(diagonal)
