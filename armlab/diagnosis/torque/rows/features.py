@@ -6,6 +6,7 @@ jumps is made of all samples and passes the filter of the torque.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations, islice
 
 import numpy as np
@@ -20,11 +21,44 @@ Part = tuple[Array, tuple[str, ...]]
 
 
 @dataclass(frozen=True, eq=False)
+class Grams:
+    """Products of features, (features, features), of each third of the rows."""
+
+    thirds: tuple[Array, ...]
+
+    @cached_property
+    def axes(self) -> tuple[tuple[Array, Array], ...]:
+        """Eigenvalues and eigenvectors of what each third leaves: of many features they take most of the time."""
+        whole = np.sum(self.thirds, axis=0)
+        return tuple((values, vectors) for values, vectors in (np.linalg.eigh(whole - own) for own in self.thirds))
+
+    def best_ridge(self, products: tuple[Array, ...], exponents: Sequence[float]) -> tuple[float, Array]:
+        """The ridge that predicts each third best from the others, and the weights with it on all.
+
+        products: of features and what is predicted, (features,), of each third. exponents: of ten, of the ridges that
+        are tried, in units of the mean squared length of a feature.
+        """
+        count = len(products[0])
+        ridges = 10.0 ** np.array(exponents) * sum(float(np.trace(gram)) for gram in self.thirds) / max(count, 1)
+        towards, errors = np.sum(products, axis=0), np.zeros(len(ridges))
+        for own, product, (values, vectors) in zip(self.thirds, products, self.axes, strict=True):
+            turned = vectors.T @ (towards - product)
+            weights = vectors @ (turned[:, None] / (np.maximum(values, 0)[:, None] + ridges))
+            errors += np.sum(weights * (own @ weights), axis=0) - 2 * product @ weights
+        best = float(ridges[int(np.argmin(errors))])
+        return best, np.linalg.solve(np.sum(self.thirds, axis=0) + best * np.eye(count), towards)
+
+
+@dataclass(frozen=True, eq=False)
 class Features:
-    """values: (rows, features). variables: per feature the names of what it depends on."""
+    """values: (rows, features). variables: per feature the names of what it depends on.
+
+    grams: of the rows of a joint that identify, where these are asked again and again.
+    """
 
     values: Array
     variables: tuple[frozenset[str], ...]
+    grams: Grams | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.torque.columns.blocks import block_numbers, held_out_gain
+from armlab.diagnosis.torque.columns.blocks import HeldOutGain, block_numbers, held_out_gain
 from armlab.diagnosis.torque.rows.data import Observed, Segment, rows_in
-from armlab.diagnosis.torque.rows.features import Features
+from armlab.diagnosis.torque.rows.features import Features, Grams
 from armlab.diagnosis.torque.rows.noise import Noise
 from armlab.diagnosis.tuning import SurrogateTuning
 
-Thirds = tuple[tuple[Array, ...], tuple[Array, ...], NDArray[np.intp]]
+Sums = tuple[tuple[Array, ...], tuple[Array, ...]]  # Gram matrices and products with the target, of each third
 
 
 def time_thirds(observed: Observed, joint: int, tuning: SurrogateTuning) -> NDArray[np.intp]:
@@ -25,12 +25,8 @@ def time_thirds(observed: Observed, joint: int, tuning: SurrogateTuning) -> NDAr
     return np.where(learn, block_numbers(observed, tuning.fold_s, tuning.min_blocks) % 3, -1)
 
 
-def products_by_third(white: Array, target: Array, thirds: NDArray[np.intp], chosen: NDArray[np.bool_]) -> Thirds:
-    """Products of the chosen rows, third by third."""
-    parts = [white[chosen & (thirds == fold)] for fold in range(3)]
-    goals = [target[chosen & (thirds == fold)] for fold in range(3)]
-    grams = tuple(part.T @ part for part in parts)
-    return grams, tuple(part.T @ goal for part, goal in zip(parts, goals, strict=True)), thirds
+def _grams(white: Array, thirds: Sequence[NDArray[np.bool_]]) -> tuple[Array, ...]:
+    return tuple(part.T @ part for part in (white[own] for own in thirds))
 
 
 def predict_in_turn(
@@ -55,55 +51,33 @@ def predict_in_turn(
 def errors_in_turn(
     white: Array,
     target: Array,
-    thirds: NDArray[np.intp],
+    thirds: Sequence[NDArray[np.bool_]],
     ridge: float,
     grams: tuple[Array, ...],
     products: tuple[Array, ...],
 ) -> Array:
     """Errors of each third where the others have been learnt from, (rows,)."""
     out, whole, towards = target.copy(), np.sum(grams, axis=0), np.sum(products, axis=0)
-    for fold in range(3):
-        weights = np.linalg.solve(whole - grams[fold] + ridge * np.eye(len(whole)), towards - products[fold])
-        out[thirds == fold] -= white[thirds == fold] @ weights
+    for own, gram, product in zip(thirds, grams, products, strict=True):
+        weights = np.linalg.solve(whole - gram + ridge * np.eye(len(whole)), towards - product)
+        out[own] -= white[own] @ weights
     return out
-
-
-def best_ridge(
-    grams: tuple[Array, ...], products: tuple[Array, ...], exponents: Sequence[float]
-) -> tuple[float, Array]:
-    """The ridge that predicts each third best from the others, and the weights with it on all.
-
-    exponents: of ten, of the ridges that are tried, in units of the mean squared length of a feature.
-    """
-    count = len(products[0])
-    ridges = 10.0 ** np.array(exponents) * sum(float(np.trace(gram)) for gram in grams) / max(count, 1)
-    whole, towards, errors = np.sum(grams, axis=0), np.sum(products, axis=0), np.zeros(len(ridges))
-    for own, product in zip(grams, products, strict=True):
-        values, vectors = np.linalg.eigh(whole - own)
-        turned = vectors.T @ (towards - product)
-        weights = vectors @ (turned[:, None] / (np.maximum(values, 0)[:, None] + ridges))
-        errors += np.sum(weights * (own @ weights), axis=0) - 2 * product @ weights
-    best = float(ridges[int(np.argmin(errors))])
-    return best, np.linalg.solve(whole + best * np.eye(count), towards)
 
 
 @dataclass(frozen=True, eq=False)
 class FoldedFeatures:
-    """Features with the third of the identification rows that each row belongs to, (rows,), -1 for none.
-
-    grams: of each third.
-    """
+    """Features with the third of the identification rows that each row belongs to, (rows,), -1 for none."""
 
     features: Features
     folds: NDArray[np.intp]
-    grams: tuple[Array, ...]
+    grams: Grams
 
 
 def fold_features(made: Features, observed: Observed, joint: int, tuning: SurrogateTuning) -> FoldedFeatures:
     """Features of a joint (from 0), with their products third by third."""
     thirds = time_thirds(observed, joint, tuning)
-    grams = tuple(made.values[thirds == fold].T @ made.values[thirds == fold] for fold in range(3))
-    return FoldedFeatures(made, thirds, grams)
+    grams = Grams(tuple(made.values[thirds == fold].T @ made.values[thirds == fold] for fold in range(3)))
+    return FoldedFeatures(replace(made, grams=grams), thirds, grams)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,12 +104,13 @@ def predict_structure(
     """What the features predict of a residual (rows,), zeros unless they do so on held-out rows, too."""
     values = made.features.values
     products = tuple(values[made.folds == fold].T @ residual[made.folds == fold] for fold in range(3))
-    ridge, weights = best_ridge(made.grams, products, tuning.ridge_exponents)
+    ridge, weights = made.grams.best_ridge(products, tuning.ridge_exponents)
     predicted = values @ weights
     rows = rows_in(observed.of_role("validate", joint), observed.rows)
     numbers, learn = block_numbers(observed, tuning.block_s, tuning.min_blocks), made.folds >= 0
     validated = held_out_gain(residual[rows], residual[rows] - predicted[rows], numbers[rows])
-    turned = errors_in_turn(values[learn], residual[learn], made.folds[learn], ridge, made.grams, products)
+    thirds = [made.folds[learn] == fold for fold in range(3)]
+    turned = errors_in_turn(values[learn], residual[learn], thirds, ridge, made.grams.thirds, products)
     inside = held_out_gain(residual[learn], turned, numbers[learn])
     gains = (validated, inside)
     sure = any(each.share > tuning.min_noise_gain and each.chance < tuning.noise_level for each in gains)
@@ -167,7 +142,7 @@ class Surrogate:
     ridge: float
     weights: Array
     sums: tuple[Array, Array]
-    in_turn: tuple[tuple[Array, ...], tuple[Array, ...]] | None
+    in_turn: Sums | None
     judged: tuple[Array, Array]
 
     def structure(self, observed: Observed, tuning: SurrogateTuning) -> Structure:
@@ -203,43 +178,90 @@ def fit_surrogate(
     noise would pass for structure, it counts only if validation runs have it, too.
     """
     plain = replace(noise, taps=tuple(np.ones(1) for _ in noise.taps), scales=tuple(1.0 for _ in noise.taps))
-    whitened = _fit_surrogate(learnt, whole, joint, noise, observed, tuning)
-    raw = _fit_surrogate(learnt, whole, joint, plain, observed, tuning)
-    return surest([whitened, raw] if raw.validation_gain > tuning.min_structure_gain else [whitened], tuning)
+    whitened = _Regression.of(learnt, joint, noise, observed, tuning)
+    raw = _Regression.of(learnt, joint, plain, observed, tuning, learnt.features.grams)
+    counted = [whitened, raw] if raw.validated.share > tuning.min_structure_gain else [whitened]
+    return surest([each.surrogate(whole, tuning) for each in counted], tuning)
 
 
-def _fit_surrogate(
-    learnt: Remainder, whole: Remainder, joint: int, noise: Noise, observed: Observed, tuning: SurrogateTuning
-) -> Surrogate:
-    learn, judge = observed.of_role("identify", joint), observed.of_role("validate", joint)
-    both = (*learn, *judge)
-    lost = noise.lost(joint)
-    numbers = _stretch_numbers(both, lost, block_numbers(observed, tuning.fold_s, tuning.min_blocks))
-    blocks = _stretch_numbers(both, lost, block_numbers(observed, tuning.block_s, tuning.min_blocks))
-    known = np.arange(len(blocks)) < sum(each.stop - each.start - lost for each in learn)
+@dataclass(frozen=True, eq=False)
+class _Regression:
+    """A surrogate learnt from the identification rows of a joint under some noise, and judged on validation runs.
 
-    def white(left: Remainder) -> tuple[Array, Array]:
-        target = noise.whitened(left.residual[:, None], joint, both)[:, 0]
-        return noise.whitened(left.features.values, joint, both), target
+    segments: of the whitened rows. numbers, blocks: of the stretches to which they belong, (rows,). known: which of
+    them identify. sums: Grams and products of these. judged: whitened columns and target of the others.
+    """
 
-    columns, target = white(learnt)
-    grams, products, _ = products_by_third(columns, target, numbers % 3, known)
-    ridge, weights = best_ridge(grams, products, tuning.ridge_exponents)
-    validated = held_out_gain(target[~known], target[~known] - columns[~known] @ weights, blocks[~known])
-    all_columns, all_target = white(whole)
-    everything = np.ones(len(known), dtype=bool)
-    thirds = products_by_third(all_columns, all_target, numbers % 3, everything)
-    turned = errors_in_turn(all_columns, all_target, thirds[2], ridge, *thirds[:2])
-    inside = held_out_gain(all_target, turned, blocks)
-    least = tuning.min_structure_gain
-    if (inside.share <= least, inside.chance) < (validated.share <= least, validated.chance):
-        best, left, in_turn, judged = inside, whole, thirds[:2], (all_columns, all_target)
-    else:
-        best, left, in_turn, judged = validated, learnt, None, (columns[~known], target[~known])
-    gram, towards = (np.asarray(np.sum(parts, axis=0)) for parts in in_turn or (grams, products))
-    return Surrogate(
-        joint, best.share, best.chance, validated.share, left, ridge, weights, (gram, towards), in_turn, judged
-    )
+    left: Remainder
+    joint: int
+    noise: Noise
+    segments: tuple[Segment, ...]
+    numbers: NDArray[np.intp]
+    blocks: NDArray[np.intp]
+    sums: Sums
+    judged: tuple[Array, Array]
+    ridge: float
+    weights: Array
+    validated: HeldOutGain
+
+    @classmethod
+    def of(
+        cls,
+        left: Remainder,
+        joint: int,
+        noise: Noise,
+        observed: Observed,
+        tuning: SurrogateTuning,
+        grams: Grams | None = None,
+    ) -> "_Regression":
+        """grams: of the identification rows under this noise, where they are known."""
+        learn, judge = observed.of_role("identify", joint), observed.of_role("validate", joint)
+        both = (*learn, *judge)
+        lost = noise.lost(joint)
+        numbers = _stretch_numbers(both, lost, block_numbers(observed, tuning.fold_s, tuning.min_blocks))
+        blocks = _stretch_numbers(both, lost, block_numbers(observed, tuning.block_s, tuning.min_blocks))
+        known = np.arange(len(blocks)) < sum(each.stop - each.start - lost for each in learn)
+        columns, target = _white(left, joint, noise, both)
+        thirds = [known & (numbers % 3 == fold) for fold in range(3)]
+        products = tuple(columns[own].T @ target[own] for own in thirds)
+        grams = grams or Grams(_grams(columns, thirds))
+        ridge, weights = grams.best_ridge(products, tuning.ridge_exponents)
+        judged = columns[~known], target[~known]
+        validated = held_out_gain(judged[1], judged[1] - judged[0] @ weights, blocks[~known])
+        sums = grams.thirds, products
+        return cls(left, joint, noise, both, numbers, blocks, sums, judged, ridge, weights, validated)
+
+    def surrogate(self, whole: Remainder, tuning: SurrogateTuning) -> Surrogate:
+        """The better of the two ways in which it is held out. whole: what a fit of all rows leaves."""
+        columns, target = _white(whole, self.joint, self.noise, self.segments)
+        thirds = [self.numbers % 3 == fold for fold in range(3)]
+        sums = _grams(columns, thirds), tuple(columns[own].T @ target[own] for own in thirds)
+        turned = errors_in_turn(columns, target, thirds, self.ridge, *sums)
+        inside, validated = held_out_gain(target, turned, self.blocks), self.validated
+        least, in_turn = tuning.min_structure_gain, None
+        if (inside.share <= least, inside.chance) < (validated.share <= least, validated.chance):
+            best, left, judged, in_turn = inside, whole, (columns, target), sums
+        else:
+            best, left, judged, sums = validated, self.left, self.judged, self.sums
+        gram, towards = (np.asarray(np.sum(parts, axis=0)) for parts in sums)
+        return Surrogate(
+            self.joint,
+            best.share,
+            best.chance,
+            validated.share,
+            left,
+            self.ridge,
+            self.weights,
+            (gram, towards),
+            in_turn,
+            judged,
+        )
+
+
+def _white(left: Remainder, joint: int, noise: Noise, segments: tuple[Segment, ...]) -> tuple[Array, Array]:
+    """Features (rows, features) and residual (rows,) of a joint, whitened."""
+    target = noise.whitened(left.residual[:, None], joint, segments)[:, 0]
+    return noise.whitened(left.features.values, joint, segments), target
 
 
 def _important_variables(
