@@ -1,6 +1,10 @@
 # armlab. `make table3` and `make test` do everything on a machine with Python 3.11, git, make and gcc.
 PYTHON ?= python3
 BIN := .venv/bin
+# pip leaves it to the first import to compile a module: most modules of most packages are never imported.
+PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+# Hundreds of short processes read what the first one has compiled.
+unexport PYTHONDONTWRITEBYTECODE
 COMPILED := algorithms/flight.c algorithms/flight_build.py \
 	problem/kernel.c problem/kernel_build.py problem/spectra.c problem/spectra_build.py \
 	armlab/effects/drive_train.c armlab/effects/drive_train_build.py \
@@ -22,12 +26,12 @@ install-dev: .venv/dev ## what the tests need too
 	$(PYTHON) -m venv .venv
 
 .venv/run: requirements/run.lock pyproject.toml setup.py $(COMPILED) | .venv/bin/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/run.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	$(PIP_INSTALL) --require-hashes -r requirements/run.lock
+	$(PIP_INSTALL) --no-deps --no-build-isolation -e .
 	@touch $@
 
 .venv/dev: .venv/run requirements/dev.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/dev.lock
+	$(PIP_INSTALL) --require-hashes -r requirements/dev.lock
 	@touch $@
 
 lock: .venv/dev ## choose the versions of all dependencies anew
@@ -108,8 +112,9 @@ installs: .venv/dev ## size and time of an installation per purpose: the table o
 
 # --- checks
 
-test: .venv/dev ## style, types and import contracts, the regression check and every test, all at the same time
-	$(MAKE) --no-print-directory --jobs=3 lint regression suite
+# The regression check needs no package of the tests: it runs while these are installed.
+test: ## style, types and import contracts, the regression check and every test, all at the same time
+	$(MAKE) --no-print-directory --jobs=3 regression lint suite
 
 # A worker takes the half of another one's tests when it has none: tests that share a fixture stay together.
 suite: .venv/dev ## every test alone, a worker and a thread of linear algebra a core
@@ -133,11 +138,11 @@ profile: .venv/dev ## where the seconds of a diagnosis go, by stage and by funct
 structure: .venv/dev ## figures of the source tree: files, lines, modules that a diagnosis loads
 	$(BIN)/python tools/structure.py
 
-regression: .venv/dev ## the best condition numbers against the committed baseline
+regression: .venv/run ## the best condition numbers against the committed baseline
 	$(BIN)/armlab tools regression
 
 fuzz: .venv/dev ## damaged files for every reader of recordings, FUZZ_SECONDS in all
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[fuzz]' --no-build-isolation
+	$(PIP_INSTALL) -e '.[fuzz]' --no-build-isolation
 	$(BIN)/python tests/recordings/fuzz_readers.py --seconds $(or $(FUZZ_SECONDS),600)
 
 logs: .venv/dev ## 2,000 logs that chance makes of clean runs: right numbers or a refusal in one line
