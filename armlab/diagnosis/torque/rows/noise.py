@@ -17,6 +17,7 @@ from armlab.diagnosis.tuning import NoiseTuning
 from armlab.recordings.recording import Role
 
 Kind = TypeVar("Kind", bound=np.generic)
+CACHED_NUMBERS = 16_000  # that are filtered at a time, 128 kB
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,16 +36,20 @@ class Noise:
 
     def whitened(self, matrix: Array, joint: int, segments: Sequence[Segment]) -> Array:
         """Rows (rows, columns) filtered within each segment and brought to unit variance; first rows are lost."""
-        return self._filtered(matrix, joint, segments) / self.scales[joint]
+        out = self._filtered(matrix, joint, segments)
+        out /= self.scales[joint]
+        return out
 
     def white(self, matrix: Array, joint: int, observed: Observed, role: Role) -> Array:
         """All rows of a role at unit variance: in their order, or those in motion and then those at rest."""
         if self.through[joint]:
             whole = observed.of_role(role)
-            return self._filtered(matrix, joint, whole) / self._kept(self.resting[joint], joint, whole)[:, None]
+            out = self._filtered(matrix, joint, whole)
+            out /= self._kept(self.resting[joint], joint, whole)[:, None]
+            return out
         rest = observed.at_rest(role, joint)
         moving = self.whitened(matrix, joint, observed.of_role(role, joint))
-        return np.concatenate([moving, matrix[rest] / self.resting[joint][rest, None]])
+        return np.concatenate([moving, matrix[rest] / self.resting[joint][rest, None]]) if len(rest) else moving
 
     def numbers(self, values: NDArray[np.intp], joint: int, observed: Observed, role: Role) -> NDArray[np.intp]:
         """Values (rows,) such as numbers of stretches at the rows of `white`."""
@@ -70,8 +75,15 @@ class Noise:
         return slice(rest.start, min(rest.stop + self.lost(joint) * self.through[joint], segment.stop))
 
     def _filtered(self, matrix: Array, joint: int, segments: Sequence[Segment]) -> Array:
-        parts = [_prediction_errors(matrix[each.start : each.stop], self.taps[joint]) for each in segments]
-        return np.concatenate(parts)
+        """Prediction errors of each segment, one below the other, in an array of their own."""
+        order = self.lost(joint)
+        out = np.empty((sum(max(each.stop - each.start - order, 0) for each in segments), matrix.shape[1]))
+        start = 0
+        for each in segments:
+            stop = start + max(each.stop - each.start - order, 0)
+            _write_prediction_errors(matrix[each.start : each.stop], self.taps[joint], out[start:stop])
+            start = stop
+        return out
 
     def _kept(self, values: NDArray[Kind], joint: int, segments: Sequence[Segment]) -> NDArray[Kind]:
         return np.concatenate([values[each.start + self.lost(joint) : each.stop] for each in segments])
@@ -88,12 +100,15 @@ def choose_noise(coloured: Noise, white: Noise, plain: NDArray[np.bool_]) -> Noi
     )
 
 
-def _prediction_errors(rows: Array, taps: Array) -> Array:
-    order = len(taps) - 1
-    out = rows[order:].copy()
-    for lag in range(1, order + 1):
-        out += taps[lag] * rows[order - lag : len(rows) - lag]
-    return out
+def _write_prediction_errors(rows: Array, taps: Array, out: Array) -> None:
+    """Rows (order + n, columns) less what those before tell of them, (n, columns): some at a time stay in the cache."""
+    order, size = len(taps) - 1, max(CACHED_NUMBERS // max(rows.shape[1], 1), 1)
+    for start in range(0, len(out), size):
+        stop = min(start + size, len(out))
+        part = out[start:stop]
+        part[:] = rows[order + start : order + stop]
+        for lag in range(1, order + 1):
+            part += taps[lag] * rows[order - lag + start : order - lag + stop]
 
 
 def fit_noise(residuals: Array, observed: Observed, fitted: float, tuning: NoiseTuning, colour: bool = True) -> Noise:
@@ -149,7 +164,7 @@ def _scales_through_rest(
     for segment in observed.segments:
         errors = np.zeros(len(residual))
         whole = residual[segment.start : segment.stop, None]
-        errors[segment.start + order : segment.stop] = _prediction_errors(whole, taps)[:, 0]
+        _write_prediction_errors(whole, taps, errors[segment.start + order : segment.stop, None])
         for rest in observed.stretches_at_rest(joint, segment):
             tied = slice(max(rest.start, segment.start + order), min(rest.stop + order, segment.stop))
             if tied.start < tied.stop:
