@@ -53,16 +53,21 @@ def test_points_that_are_none_break_the_contract(statement: str, reason: str) ->
         )
 
 
-@pytest.mark.parametrize("change", ["X[:, :1]", "X[0]", "X + 0j"])
-def test_a_plug_in_that_breaks_the_contract_is_one_line_and_its_trials_are_losses(
-    small: Path, plug_in: PlugIn, armlab: Armlab, change: str
-) -> None:
+def run_with_breach(small: Path, plug_in: PlugIn, armlab: Armlab, change: str) -> "subprocess.CompletedProcess[str]":
+    """`armlab run` of a plug-in that asks for something else than points, beside another algorithm."""
     plug_in("pass")
     module = small.parent / "site" / "plug_in.py"
     body = f"X, state = RandomSearch.ask(state)\n        return {change}, state\n"
     module.write_text(f"{module.read_text()}\n    @staticmethod\n    def ask(state):\n        {body}")
     small.write_text(small.read_text().replace("[spso, de]", "[plug-in, de]"))
-    done = armlab("run", small.name, "--quiet")
+    return armlab("run", small.name, "--quiet")
+
+
+@pytest.mark.parametrize("change", ["X[:, :1]", "X[0]", "X + 0j"])
+def test_a_plug_in_that_breaks_the_contract_is_one_line_and_its_trials_are_losses(
+    small: Path, plug_in: PlugIn, armlab: Armlab, change: str
+) -> None:
+    done = run_with_breach(small, plug_in, armlab, change)
     assert done.returncode == 1
     (line,) = done.stderr.strip().splitlines()
     assert line.startswith("armlab: 3 trials failed, which count as losses and are not kept: plug-in on ")
@@ -73,6 +78,12 @@ def test_a_plug_in_that_breaks_the_contract_is_one_line_and_its_trials_are_losse
     assert "3 trials of plug-in on sphere failed and count as infeasible" in (
         small.parent / "results" / "small.md"
     ).read_text().replace("\n", " ")
+
+
+def test_results_with_trials_that_failed_are_reported_drawn_and_shared(
+    small: Path, plug_in: PlugIn, armlab: Armlab
+) -> None:
+    run_with_breach(small, plug_in, armlab, "X[:, :1]")
     for command in (
         ["report", small.name],
         ["bench", "draw", small.name, "--out", "fig"],
