@@ -13,7 +13,15 @@ from scipy.interpolate import make_interp_spline
 from armlab.common.arrays import Array
 from armlab.effects.contract import Scene
 from armlab.effects.sensitivity import directional_derivative
-from armlab.effects.transmission import WALL_HZ, Backlash, JointElasticity, Twist, felt_inertia, integrate_twist
+from armlab.effects.transmission import (
+    WALL_HZ,
+    Backlash,
+    JointElasticity,
+    Twist,
+    felt_inertia,
+    integrate_twist,
+    integrate_twists,
+)
 from problem.motion import Motion
 
 JOINT = 1
@@ -86,6 +94,14 @@ def test_the_inertia_of_a_joint_is_positive_and_left_to_its_links() -> None:
     inertia = felt_inertia(scene_of(arm, motor, time), JOINT)
     assert inertia.shape == time.shape
     assert inertia.min() > 0
+
+
+def test_gaps_side_by_side_are_each_alone_to_the_bit() -> None:
+    time, motor = waves(3, 2, 1.0)
+    where = scene_of(random_arm("RRR", seed=3), motor, time)
+    laws = [Twist(gap=gap) for gap in np.geomspace(1e-5, 1e-2, 11)]
+    together = integrate_twists(where, JOINT, laws)
+    np.testing.assert_array_equal(together, [integrate_twist(where, JOINT, law) for law in laws])
 
 
 def test_a_scan_finds_the_gap_that_left_its_torque() -> None:
