@@ -255,48 +255,27 @@ class Fitter:
             gram[places, places] = scale[joint] * grams[joint, links:, links:]
         return gram[np.ix_(layout.kept, layout.kept)], product[layout.kept]
 
-    def beyond_limits(self, reading: Reading) -> int:
-        """How many joints move beyond their limits."""
-        position = self.columns(reading).motion.position
-        out = 0
-        for joint, own in enumerate(reading.arm.joints):
-            low, high = own.limits.position
-            slack = self.tuning.limit_slack * (high - low)
-            out += bool(
-                np.isfinite(slack)
-                and (position[:, joint].min() < low - slack or position[:, joint].max() > high + slack)
-            )
-        return out
-
-    def too_fast(self, reading: Reading) -> int:
-        """How many joints would be faster than joints are, a quarter of the time."""
-        speed = np.quantile(np.abs(self.columns(reading).motion.velocity), SPEED_QUANTILE, axis=0)
-        return int(np.sum(speed > self.tuning.fastest_speed))
-
     def implausible(self, reading: Reading) -> frozenset[int]:
-        """Joints (from 0) that would be faster, or slower at their fastest, than joints of arms are, or hardly turn."""
+        """Joints (from 0) that would be faster than joints of arms are, or hardly turn."""
         motion, tuning = self.columns(reading).motion, self.tuning
-        speed = np.abs(motion.velocity).max(axis=0)
+        fast = np.abs(motion.velocity).max(axis=0) > tuning.fastest_speed
         turning = np.array([joint.kind == "revolute" for joint in reading.arm.joints])
         hardly = turning & (np.ptp(motion.position, axis=0) < tuning.little_travel)
-        return frozenset(
-            np.flatnonzero((speed < tuning.slowest_speed) | (speed > tuning.fastest_speed) | hardly).tolist()
-        )
+        return frozenset(np.flatnonzero(fast | hardly).tolist())
 
-    def torque_gains(self, reading: Reading) -> list[tuple[float, float]]:
-        """Factor between the torque of each joint and that of the links as given, and the share that it explains."""
+    def torque_gains(self, reading: Reading) -> Array:
+        """Factor between the torque of each joint and that of the links as given, friction apart, (joints,)."""
         columns = self.columns(reading)
         torque = self.channels.read_torque(reading) + self.channels.added_gravity(reading) - columns.stated
         given = rigid_body_torque(reading.arm, columns.motion, reading.inertial)
-        out = []
+        out = np.zeros(reading.joints)
         for joint in range(reading.joints):
             own = columns.own[:, joint, :SPRING]
             model, measured = (
                 each[:, joint] - own @ np.linalg.lstsq(own, each[:, joint])[0] for each in (given, torque)
             )
-            power, total = float(model @ model), float(measured @ measured)
-            gain = float(model @ measured) / power if power > 0 else 0.0
-            out.append((gain, gain**2 * power / total if total > 0 else 0.0))
+            power = float(model @ model)
+            out[joint] = float(model @ measured) / power if power > 0 else 0.0
         return out
 
 
@@ -444,7 +423,6 @@ def _not_negative(gram: Array, product: Array) -> Array:
 
 
 SMALLEST = 1e-100
-SPEED_QUANTILE = 0.75  # quantile of the speeds: more than a spike
 MAX_NEWTON_STEPS = 40  # for each weight of the barriers
 NEWTON_TOLERANCE = 1e-2  # of the weight of the barriers
 BARRIER_FALL = 0.1

@@ -157,16 +157,11 @@ class ReadingJudge:
     def _losses(self, reading: Reading, width: float) -> Array:
         (score,) = self.fitter.scores(reading, (width,))
         errors = np.log(np.maximum(score.errors, self.tuning.smallest_error))
-        return np.asarray(errors + score.distance / reading.joints + self._impossible(reading))
+        return np.asarray(errors + score.distance / reading.joints)
 
     def _widths(self, reading: Reading) -> tuple[float, ...]:
         tuning = self.tuning
-        return (tuning.unknown_width,) if reading.inertial is None else (tuning.near_width, tuning.free_width)
-
-    def _impossible(self, reading: Reading) -> float:
-        """Loss of a joint of a reading that breaks limits of position, or is faster than joints are, nats."""
-        broken = self.fitter.beyond_limits(reading) * self.tuning.limit_loss
-        return (broken + self.fitter.too_fast(reading) * self.tuning.speed_loss) / reading.joints
+        return (tuning.free_width,) if reading.inertial is None else (tuning.near_width, tuning.free_width)
 
     def errors(self, reading: Reading) -> tuple[Errors, Errors]:
         """Held-out errors near the links of the simulation, and with free ones: the same twice without a simulation."""
@@ -183,8 +178,7 @@ class ReadingJudge:
         better = np.argmin([each.errors for each in fits], axis=0)
         errors = np.min([each.errors for each in fits], axis=0)
         chosen = np.where(better, shares[1], shares[0])
-        losses = 0.5 * np.log(chosen + self.tuning.smallest_error**2) + self._impossible(reading)
-        return Errors(errors, np.asarray(losses))
+        return Errors(errors, np.asarray(0.5 * np.log(chosen + self.tuning.smallest_error**2)))
 
     def gain(self, before: Trial, after: Trial) -> Gain:
         """How far errors fall from one reading to another."""
@@ -193,10 +187,10 @@ class ReadingJudge:
         return Gain(*(View.between(first, second, smallest) for first, second in pairs))
 
     def fits_alike(self, other: Trial, best: Trial) -> bool:
-        """Whether the best reading explains not much more than another one, or not surely more."""
-        view, tuning = self.gain(other, best).near, self.tuning
-        unsure = view.gain < tuning.max_rival_gain and view.total_sigmas < tuning.rival_sigmas
-        return view.gain < tuning.rival_gain or unsure
+        """Whether the best reading does not surely explain more than another one, nor as much as a mistake has to."""
+        if other.loss - best.loss >= self.tuning.least_evidence:
+            return False
+        return self.gain(other, best).near.total_sigmas < self.tuning.sure_deviations
 
     def is_usual(self, trial: Trial) -> bool:
         """Whether no joint leaves more than joints of real arms do."""

@@ -70,9 +70,7 @@ def find_mistakes(judge: ReadingJudge, start: Trial) -> Found:
 def _is_better(other: Trial, best: Trial, tuning: ReadingTuning) -> bool:
     """Whether a reading explains clearly more, or as much with fewer mistakes."""
     is_simpler = len(other.reading.mistakes) < len(best.reading.mistakes)
-    return other.loss < best.loss - tuning.least_evidence or (
-        is_simpler and other.loss <= best.loss + tuning.rival_gain
-    )
+    return other.loss < best.loss - tuning.least_evidence or (is_simpler and other.loss <= best.loss)
 
 
 def _extend(judge: ReadingJudge, trial: Trial, singles: list[Trial]) -> tuple[Trial, list[Trial]]:
@@ -124,7 +122,7 @@ def _merge_at_joints(judge: ReadingJudge, start: Trial, best: Trial) -> Trial:
         others = [mistake for mistake in own if _place(mistake) != place]
         singles = search_singles(judge, judge.trial(rebuild(judge, start.reading, others)))
         merged = next((each for each in singles if _place(each.reading.mistakes[-1]) == place), None)
-        if merged is not None and merged.loss <= best.loss + judge.tuning.rival_gain:
+        if merged is not None and judge.fits_alike(merged, best):
             return _merge_at_joints(judge, start, merged)
     return best
 
@@ -141,7 +139,7 @@ def _better_in_place(
     for parent, singles, mistake in zip(without, lists, best.reading.mistakes, strict=True):
         if not judge.is_accepted(parent, best, mistake):
             return parent
-        nearest = (each for each in singles[: judge.tuning.beam] if each.loss < best.loss - judge.tuning.rival_gain)
+        nearest = (each for each in singles[: judge.tuning.beam] if each.loss < best.loss)
         other = next((each for each in nearest if judge.is_accepted(parent, each)), None)
         if other is not None:
             return other
@@ -150,13 +148,10 @@ def _better_in_place(
 
 def _rivals(judge: ReadingJudge, without: Trial, best: Trial, place: int, singles: list[Trial]) -> tuple[Trial, ...]:
     """Readings with another mistake at one place that fit as well as the best one. singles: beside the other ones."""
-    tuning = judge.tuning
     out = {_name(best.reading.mistakes[place]): best}
     for each in singles:
         name = _name(each.reading.mistakes[-1])
-        if each.loss - best.loss > tuning.max_rival_gain or name in out:
-            continue
-        if judge.fits_alike(each, best) and judge.is_accepted(without, each):
+        if name not in out and judge.fits_alike(each, best) and judge.is_accepted(without, each):
             out[name] = each
     return tuple(out.values())[1:]
 
@@ -179,9 +174,8 @@ def _undecided(judge: ReadingJudge, singles: list[Trial], best: Trial) -> tuple[
     out = set()
     for each in singles:
         mistake = each.reading.mistakes[-1]
-        if mistake.effect != "encoder_offset" or each.loss - best.loss >= judge.tuning.max_rival_gain:
-            continue
-        is_quarter = abs(abs(mistake.value("offset")) % (np.pi / 2)) < 1e-9
+        is_zero = mistake.effect == "encoder_offset"
+        is_quarter = is_zero and abs(abs(mistake.value("offset")) % (np.pi / 2)) < 1e-9
         if is_quarter and judge.fits_alike(each, best):
             out.add(mistake.joint or 0)
     return tuple(sorted(out))

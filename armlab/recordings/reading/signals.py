@@ -13,6 +13,7 @@ from armlab.recordings.channels import gravity_torque
 from armlab.recordings.cutoff import MAX_CUTOFF_SHARE, MIN_CUTOFF_PERIODS, travel_bandwidth
 from armlab.recordings.differentiate import Signals, differentiate, resample_evenly
 from armlab.recordings.filters import Butterworth
+from armlab.recordings.identifiable import MIN_DURATION_S
 from armlab.recordings.reading.reading import Reading, second_drives
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording, Run
@@ -124,16 +125,20 @@ class ThinnedRows:
 
 
 def thin_channels(recording: Recording, tuning: ReadingTuning) -> ThinnedRows | None:
-    """The channels of the runs that identify; None where they are too short or the transmission cannot be undone."""
+    """The channels of the runs that identify, short ones left out; None without any, or without a way back to channels.
+
+    A transmission has to be undone: it leads from channels to joints.
+    """
     given = recording.transmission
     to_torque = given.torque * given.gains
     for matrix in (given.position, to_torque):
-        if matrix.shape[0] != matrix.shape[1] or np.linalg.cond(matrix) > tuning.max_transmission_condition:
+        if matrix.shape[0] != matrix.shape[1] or np.linalg.matrix_rank(matrix) < len(matrix):
             return None
-    runs = recording.with_role("identify") or recording.runs
-    if min(_length(run) for run in runs) < tuning.min_run_s:
+    identify = recording.with_role("identify") or recording.runs
+    runs = [resample_evenly(run) for run in identify if _length(run) >= MIN_DURATION_S]
+    if not runs:
         return None
-    signals = [differentiate(run, cutoff_hz=_cutoff_hz(run)) for run in map(resample_evenly, runs)]
+    signals = [differentiate(run, cutoff_hz=_cutoff_hz(run)) for run in runs]
     return ThinnedRows(
         _channels(recording, signals, tuning, SEARCHED),
         _channels(recording, signals, tuning, tuple(not each for each in SEARCHED)),
@@ -146,19 +151,18 @@ def _channels(
     """The channels at every instant of each six that is chosen."""
     given = recording.transmission
     undo, undo_torque = np.linalg.inv(given.position).T, np.linalg.inv(given.torque * given.gains).T
-    runs = recording.with_role("identify") or recording.runs
-    margin = min(tuning.max_delay_s, *(tuning.max_delay_share * _length(run) for run in runs))
-    whole_s = sum(_length(run) for run in runs)
+    lengths = [_length(each.run) for each in signals]
+    margin, whole_s = min(tuning.max_delay_s, tuning.max_delay_share * min(lengths)), sum(lengths)
     step_s = whole_s / tuning.rows
     motions, stamps, numbers, torques, velocities, blocks = [], [], [], [], [], []
     first = 0
-    for number, (run, filtered) in enumerate(zip(runs, signals, strict=True)):
+    for number, filtered in enumerate(signals):
         time = filtered.run.time
         inside = filtered.filter.rows
         low, high = time[inside][0] + margin, time[inside][-1] - margin
         rows = np.flatnonzero((time >= low) & (time <= high))[:: max(round(step_s * filtered.run.rate_hz), 1)]
         kept = np.resize(chosen, len(rows))
-        count = int(np.clip(round(tuning.blocks * _length(run) / whole_s), 1, len(rows) // len(chosen)))
+        count = int(np.clip(round(tuning.blocks * _length(filtered.run) / whole_s), 1, len(rows) // len(chosen)))
         blocks.append((first + np.arange(len(rows)) * count // len(rows))[kept])
         first += count
         rows = rows[kept]

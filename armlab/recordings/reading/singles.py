@@ -53,22 +53,15 @@ def _exact(judge: ReadingJudge, reading: Reading) -> Iterable[Reading]:
 
 
 def _torque_factors(judge: ReadingJudge, reading: Reading) -> Iterable[Reading]:
-    """Factors between the torque and that of the links as given, where they are far from one."""
-    score = judge.fitter.torque_gains(reading)
-    own = np.array([gain for gain, _ in score])
-    sure = np.array([share for _, share in score]) > judge.tuning.min_gain_share
-    if reading.joints > 1 and sure.any():
-        yield from _torque_factor(judge, reading, None, float(np.median(own[sure])))
-    for joint in np.flatnonzero(sure):
-        yield from _torque_factor(judge, reading, int(joint), float(own[joint]))
-
-
-def _torque_factor(judge: ReadingJudge, reading: Reading, joint: int | None, factor: float) -> Iterable[Reading]:
+    """Factors between the torque and that of the links as given, of all joints and of each; a usual unit near them."""
+    own = judge.fitter.torque_gains(reading)
+    everywhere = [(None, float(np.median(own)))] if reading.joints > 1 else []
     limit = judge.tuning.min_unit_factor
-    if factor > limit or 0 < factor < 1 / limit:
-        near = min(table.TORQUE_UNITS, key=lambda each: abs(np.log(each / factor)))
-        known = abs(np.log(near / factor)) < judge.tuning.unit_tolerance
-        yield table.unit_error(reading, joint, table.TORQUE, near if known else factor)
+    for joint, factor in (*everywhere, *enumerate(own.tolist())):
+        if factor > limit or 0 < factor < 1 / limit:
+            near = min(table.TORQUE_UNITS, key=lambda each: abs(np.log(each / factor)))
+            is_unit = abs(np.log(near / factor)) < np.log(limit)
+            yield table.unit_error(reading, joint, table.TORQUE, near if is_unit else factor)
 
 
 def _refine(make: Callable[[float], Reading], judge: ReadingJudge, around: float, reach: float) -> Trial:
@@ -111,13 +104,11 @@ def _half_turn(angle: float) -> float:
 
 
 def _is_quarter(judge: ReadingJudge, turned: Trial | None, refined: Trial, angle: float) -> bool:
-    """Whether a zero is a multiple of 90 degrees: near it, or the data do not tell it from one not far away."""
+    """Whether a zero is a multiple of 90 degrees: off from it by no more than physics, or the data do not tell."""
     if turned is None:
         return False
     off = abs(_half_turn(angle - np.rad2deg(turned.reading.mistakes[-1].value("offset"))))
-    if off < judge.tuning.quarter_tolerance_deg:
-        return True
-    return off < judge.tuning.quarter_reach_deg and judge.fits_alike(turned, refined)
+    return off < judge.tuning.min_zero_deg or judge.fits_alike(turned, refined)
 
 
 def _gravities(judge: ReadingJudge, start: Trial) -> list[Trial]:
@@ -144,13 +135,9 @@ def _gravities(judge: ReadingJudge, start: Trial) -> list[Trial]:
 
 
 def _is_level(judge: ReadingJudge, coarse: list[Trial], refined: Trial) -> bool:
-    """Whether the data do not tell gravity from a near axis of the base: floors, walls and ceilings are level."""
-    own = np.array(refined.reading.arm.gravity)
-    for each in coarse:
-        axis = np.array(each.reading.arm.gravity)
-        if np.count_nonzero(axis) == 1 and angle_between(own, axis) < judge.tuning.level_reach_deg:
-            return judge.fits_alike(each, refined)
-    return False
+    """Whether the data do not tell gravity from an axis of the base: floors, walls and ceilings are level."""
+    level = (each for each in coarse if np.count_nonzero(each.reading.arm.gravity) == 1)
+    return any(judge.fits_alike(each, refined) for each in level)
 
 
 def angle_between(first: Array, second: Array) -> float:
@@ -198,8 +185,7 @@ def _clocks(judge: ReadingJudge, start: Trial) -> list[Trial]:
     if scanned[best].loss > start.loss - judge.tuning.min_refined_gain:
         return []
     refined = _refine(make, judge, float(best), float(grid[1] - grid[0]))
-    factor = refined.reading.mistakes[-1].value("factor")
-    return [refined] if abs(np.log(factor)) >= np.log(judge.tuning.min_clock_factor) else []
+    return [refined]
 
 
 def _gears(judge: ReadingJudge, start: Trial) -> list[Trial]:
@@ -217,11 +203,7 @@ def _gears(judge: ReadingJudge, start: Trial) -> list[Trial]:
             return table.gear_ratio(start.reading, joint, sign * float(np.exp(logarithm)))
 
         grid = np.log(table.GEAR_RATIOS) * (1 if outwards else -1)
-        pairs = [(value, sign) for value in grid for sign in (1.0, -1.0)]
-        plausible = [each for each in pairs if joint not in judge.fitter.implausible(make(*each))]
-        if not plausible:
-            continue
-        scanned = {each: judge.trial(make(*each)) for each in plausible}
+        scanned = {(value, sign): judge.trial(make(value, sign)) for value in grid for sign in (1.0, -1.0)}
         value, sign = min(scanned, key=lambda each: scanned[each].loss)
         out.append(_refine(partial(make, sign=sign), judge, float(value), abs(float(grid[1] - grid[0]))))
     return out

@@ -30,13 +30,9 @@ class ReadingTuning:
     blocks: int = tuned(
         20, unit="blocks", meaning="blocks of time of all runs, of which every second is held out", least=4
     )
-    min_run_s: float = tuned(2.0, unit="s", meaning="a recording with a shorter run is taken as it is", least=0.5)
     max_delay_s: float = tuned(0.5, unit="s", meaning="largest delay that is looked for", least=0.01)
     max_delay_share: float = tuned(
         0.08, unit="of the shortest run", meaning="largest delay that is looked for", most=0.3
-    )
-    max_transmission_condition: float = tuned(
-        1e8, meaning="condition number above which a transmission cannot be undone", least=1.0
     )
     smallest_error: float = tuned(
         0.01,
@@ -59,20 +55,11 @@ class ReadingTuning:
     free_width: float = tuned(
         3.0, unit="of the pseudo-inertia", meaning="width of the prior about links that are free", least=1e-3
     )
-    unknown_width: float = tuned(
-        10.0, unit="of the pseudo-inertia", meaning="the same for a robot file without links", least=1e-3
-    )
     sign_width: float = tuned(
         0.02, unit="of the largest speed", meaning="speed at which the sign of a velocity is taken for full", least=1e-6
     )
-    min_gain_share: float = tuned(
-        0.3, unit="of the torque's scatter", meaning="links that explain less of a joint tell nothing of its unit"
-    )
     min_unit_factor: float = tuned(
         1.6, meaning="torque of another unit is at least so many times too large or small; less is a gain", least=1.0
-    )
-    unit_tolerance: float = tuned(
-        0.25, unit="of the logarithm", meaning="a factor so near to that of a usual unit is this unit", least=1e-6
     )
     refine_steps: int = tuned(16, unit="steps", meaning="of the search for a number", least=2)
     min_refined_gain: float = tuned(
@@ -80,9 +67,6 @@ class ReadingTuning:
     )
     min_zero_deg: float = tuned(
         10.0, unit="deg", meaning="a zero that is less far off is physics", source="the contract of findings"
-    )
-    quarter_tolerance_deg: float = tuned(
-        8.0, unit="deg", meaning="a zero so near to a multiple of 90 degrees is that multiple, the rest is physics"
     )
     min_tilt_deg: float = tuned(
         5.0, unit="deg", meaning="a base that is less tilted is physics", source="the contract of findings"
@@ -92,7 +76,6 @@ class ReadingTuning:
     )
     delay_steps: int = tuned(5, unit="values", meaning="delays that are tried each way", least=2)
     max_clock_factor: float = tuned(2.5, meaning="clocks that are tried run so many times too fast or slow", least=1.01)
-    min_clock_factor: float = tuned(1.05, meaning="a clock that is less wrong is not looked for", least=1.001)
     clock_steps: int = tuned(13, unit="values", meaning="clocks that are tried", least=3)
     far_travel: float = tuned(15.0, unit="rad", meaning="a joint that travels further may be read before its gear")
     little_travel: float = tuned(
@@ -127,31 +110,9 @@ class ReadingTuning:
     )
     beam: int = tuned(4, unit="readings", meaning="single mistakes that a second one is looked for beside", least=1)
     max_mistakes: int = tuned(3, unit="mistakes", meaning="most mistakes of a recording", least=1)
-    rival_gain: float = tuned(0.1, unit="nats", meaning="a reading that is less worse fits alike")
-    rival_sigmas: float = tuned(3.0, unit="standard errors", meaning="a reading that is less surely worse fits alike")
-    max_rival_gain: float = tuned(0.4, unit="nats", meaning="a reading that is more worse never fits alike")
-    limit_slack: float = tuned(
-        0.05, unit="of the range", meaning="a joint that moves further beyond its limits breaks them"
-    )
-    limit_loss: float = tuned(
-        0.3,
-        unit="nats",
-        meaning="loss of a reading for each joint that breaks its limits: less than a mistake has to gain",
-    )
-    slowest_speed: float = tuned(
-        0.01, unit="rad/s (m/s)", meaning="no reading makes a joint slower than this at its fastest"
-    )
     fastest_speed: float = tuned(30.0, unit="rad/s (m/s)", meaning="no reading makes a joint faster than this")
-    speed_loss: float = tuned(
-        1.0, unit="nats", meaning="loss of a reading for each joint that is faster than that a quarter of the time"
-    )
     min_slope_likeness: float = tuned(
         0.9, meaning="correlation and slope from which on a recorded velocity confirms the clock", most=0.999
-    )
-    quarter_reach_deg: float = tuned(
-        30.0,
-        unit="deg",
-        meaning="a zero so near to a multiple of 90 degrees is that multiple where the data do not tell",
     )
     max_class: int = tuned(
         3,
@@ -170,20 +131,4 @@ class ReadingTuning:
     )
     max_unexplained: float = tuned(
         0.6, unit="of the torque's scatter", meaning="what an arm of the right geometry and reading leaves at most"
-    )
-    standstill_s: float = tuned(0.3, unit="s", meaning="length of a stretch in which an arm stands still", least=0.01)
-    still_travel: float = tuned(
-        2e-3, unit="of a joint's travel", meaning="a joint that moves less in such a stretch stands still"
-    )
-    min_standstill_load: float = tuned(
-        1.0, unit="of the torque's scatter", meaning="gravity torque from which on standstill tells something"
-    )
-    least_standstill_share: float = tuned(
-        0.2, meaning="a joint that holds less of its gravity torque at standstill is read wrongly"
-    )
-    level_reach_deg: float = tuned(
-        10.0,
-        unit="deg",
-        meaning="gravity so near to an axis of the base is that axis where the data do not tell",
-        source="set after a look at the KUKA, whose gravity is fitted 7.4 degrees off read rightly",
     )
