@@ -284,6 +284,13 @@ class PruningTuning:
     self_evident_gain: float = tuned(
         0.25, "gain that needs no other evidence for its name", "of the joint's held-out error"
     )
+    held_out_level: float = tuned(
+        0.2,
+        "level of the test that stretches of time share a held-out gain",
+        "one-sided p-value",
+        source="a collaborative arm: without it couplings take the place of friction, 0.05 loses one",
+        most=1.0,
+    )
     max_cycles: int = tuned(3, "cycles of withdrawing and looking again", "cycles", least=1)
 
 
@@ -471,6 +478,12 @@ class PlausibilityTuning:
         "what a name with a parameter outside its plausible range adds to the log evidence",
         "log likelihood",
         source="ten times pruning.least_evidence: evidence counts structure that the library lacks, too",
+    )
+    max_interval_ratio: float = tuned(
+        30.0,
+        "highest over lowest end of the interval of a positive parameter that is known",
+        source="development sets: 12 for a right finding; an interval of 94 % of the value to both sides has it",
+        least=1.0,
     )
     max_unknown_ratio: float = tuned(
         0.5,

@@ -49,6 +49,7 @@ def test_a_sure_effect_passes_and_each_failed_test_has_its_value_and_its_bound()
         "significance": (replace(SURE, corrected=0.5), 0.5, tuning.level),
         "log evidence": (replace(SURE, score=1.0, gain=0.0), 1.0, tuning.least_evidence),
         "held-out gain": (replace(SURE, gain=0.0), 0.0, tuning.least_gain),
+        "p of the held-out gain": (replace(SURE, held_p=0.5), 0.5, tuning.held_out_level),
         "error of validation runs": (replace(SURE, rms_after=1.5), 0.5, settings.tuning.evidence.max_loss),
     }
     for name, (evidence, value, bound) in failing.items():

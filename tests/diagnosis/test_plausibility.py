@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from armlab.diagnosis.torque.evidence.plausibility import reason_implausible
+from armlab.diagnosis.tuning import PlausibilityTuning
 from armlab.effects.contract import Candidate
 from armlab.effects.friction import ViscousFriction
 from armlab.effects.memory import ViscousDrift
@@ -40,7 +41,7 @@ def reason(
 ) -> str | None:
     named = tuple(ParameterValue(name, value, interval, "") for name, value, interval in values)
     observed: Any = ObservedStandIn()
-    return reason_implausible(candidate, named, observed, known=known, exact=exact)
+    return reason_implausible(candidate, named, observed, known=known, exact=exact, tuning=PlausibilityTuning())
 
 
 def test_a_coefficient_that_may_be_zero_is_no_finding() -> None:

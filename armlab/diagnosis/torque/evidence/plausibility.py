@@ -2,7 +2,7 @@
 
 What an effect's parameters are on arms stands on the effect (`Parameter.plausible`, with its source). A law that fits
 with other numbers stands for structure that the library lacks, unless the evidence is overwhelming. An interval that
-holds zero or a whole circle is no knowledge of a parameter.
+holds zero, several orders of magnitude or a whole circle is no knowledge of a parameter.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ from armlab.diagnosis.torque.rows.data import Observed
 from armlab.diagnosis.torque.search.fitted_model import FittedModel
 from armlab.diagnosis.torque.search.search import FailedTest, Step
 from armlab.diagnosis.torque.search.surrogate import Structure
-from armlab.diagnosis.tuning import Tuning
+from armlab.diagnosis.tuning import PlausibilityTuning, Tuning
 from armlab.effects.contract import Candidate, Kind, Parameter
 from armlab.effects.links import SolidBody
 from armlab.effects.parameters import ParameterValue, parameter_values
@@ -103,7 +103,7 @@ def doubtful_names(
             values = tuple(map(_as_difference, values))
         known = evidence.gain >= tuning.pruning.self_evident_gain
         known &= evidence.score >= tuning.plausibility.overwhelming_evidence
-        reason = reason_implausible(candidate, values, observed, known=known, exact=exact)
+        reason = reason_implausible(candidate, values, observed, known=known, exact=exact, tuning=tuning.plausibility)
         if len(coefficients) == 1 and abs(coefficients[0]) <= wide.factor * np.sqrt(covariance[0, 0]):
             reason = reason or "its size may be zero"
         if reason is not None:
@@ -195,6 +195,7 @@ def reason_implausible(
     *,
     known: bool,
     exact: bool,
+    tuning: PlausibilityTuning,
 ) -> str | None:
     """Why these parameters are not believed, in a few words; None where they are.
 
@@ -208,7 +209,7 @@ def reason_implausible(
         if parameter is None or isinstance(each.value, tuple):
             continue
         reason = None if exact else _reason_below_sampling(parameter, each.value, observed)
-        reason = reason or _reason_unknown(parameter, each)
+        reason = reason or _reason_unknown(parameter, each, tuning)
         reason = reason or (None if known else _reason_out_of_range(parameter, each, kind))
         if reason is not None:
             return reason
@@ -222,8 +223,8 @@ def _reason_below_sampling(parameter: Parameter, value: float, observed: Observe
     return f"{parameter.name} {value:.3g}: less than one sampling interval ({interval:.3g} s) is how a log is made"
 
 
-def _reason_unknown(parameter: Parameter, each: ParameterValue) -> str | None:
-    """An interval that holds zero or is too wide for its parameter."""
+def _reason_unknown(parameter: Parameter, each: ParameterValue, tuning: PlausibilityTuning) -> str | None:
+    """An interval that holds zero, spans orders of magnitude or is too wide for its parameter."""
     if parameter.detail:
         return None
     ends = _interval(each)
@@ -235,6 +236,8 @@ def _reason_unknown(parameter: Parameter, each: ParameterValue) -> str | None:
         return f"{shown}: wider than {parameter.max_width:.3g} says nothing"
     if parameter.positive and low <= 0:
         return f"{shown}: it may be zero"
+    if parameter.positive and high > tuning.max_interval_ratio * low:
+        return f"{shown}: not even its order of magnitude is known"
     return None
 
 

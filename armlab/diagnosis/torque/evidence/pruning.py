@@ -36,7 +36,14 @@ def first_failed_test(evidence: Evidence, settings: Settings) -> FailedTest | No
     if guards.heldout_gain and gain < tuning.least_gain:
         text = f"held-out gain {100 * gain:.3g} %"
         return FailedTest("held-out gain", text, gain, tuning.least_gain, "pruning.least_gain")
-    if guards.heldout_gain and evidence.repeatable and evidence.is_refuted(settings.tuning.evidence):
+    if not guards.heldout_gain or not evidence.repeatable:
+        return None
+    if not evidence.usual and evidence.held_p > tuning.held_out_level:
+        text, level = f"held-out gain not sure (p = {evidence.held_p:.2g})", tuning.held_out_level
+        return FailedTest(
+            "p of the held-out gain", text, evidence.held_p, level, "pruning.held_out_level", at_least=False
+        )
+    if evidence.is_refuted(settings.tuning.evidence):
         growth, most = -evidence.fall, settings.tuning.evidence.max_loss
         text = f"the error of validation runs grows by {100 * growth:.2g} %"
         return FailedTest("error of validation runs", text, growth, most, "evidence.max_loss", at_least=False)
