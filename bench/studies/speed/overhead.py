@@ -17,7 +17,7 @@ from bench.studies.speed.clock import Task, median_seconds
 
 DIMENSION, SWARM_SIZE, ITERATIONS, HALF_WIDTH = 15, 50, 30, 100.0
 ALGORITHMS = ("mupso", "spso", "gwo", "woa", "goa", "de", "cma-es", "random-search")
-OVERHEAD_ROUNDS = 5
+OVERHEAD_ROUNDS = 15
 
 
 def measure_overheads() -> dict[str, dict[str, float]]:
