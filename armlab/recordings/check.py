@@ -28,7 +28,8 @@ from armlab.recordings.possible import (
     correlation,
     has_usual_position,
 )
-from armlab.recordings.reading.answer import read_rightly
+from armlab.recordings.reading.answer import Answer, read_rightly
+from armlab.recordings.reading.signs import compare_standstill
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import AnyRun, Finding, MotionRun, Recording, Run
 from armlab.recordings.recording_file import RecordingFile, RunEntry
@@ -52,16 +53,19 @@ def check_channels(run: MotionRun, arm: Arm) -> tuple[Finding, ...]:
 
 
 def signs_of_wrong_reading(recording: Recording) -> tuple[Finding, ...]:
-    """Warnings about names, clock and limits, each once: cheap signs of a mistake in the reading."""
+    """Warnings about names, clock, limits and standstill, each once: cheap signs of a mistake in the reading."""
     found = [*recording.findings]
     for run in recording.runs:
         found += [*run.findings, *check_channels(run, recording.arm)]
+    links = recording.arm.parameters if recording.arm.links is not None else None
+    found += compare_standstill(recording, links, ReadingTuning())
     kinds = (
         "joint_names",
         "rate",
         "beyond_limits",
         "velocity_mismatch",
         "lost_rows",
+        "standstill",
         "encoder_period",
         "unsigned_current",
     )
@@ -237,7 +241,7 @@ def check_recording(folder: Path, progress: Callable[[str], None] = lambda messa
     tells_nothing = _find_nothing_to_identify(whole)
     is_readable = bool(runs) and not has_no_torque(runs) and reason_still(runs) is None
     progress("asking how it is to be read")
-    geometry = (*tells_nothing, *(_check_reading(whole) if is_readable else ()))
+    geometry = (*tells_nothing, *(_check_geometry(whole) if is_readable else ()))
     beside = _compare_with_simulator(whole, with_actuators=False)
     beside = (*_find_impossible_links(whole), *_stated_laws(whole.arm), *beside)
     return CheckResult(
@@ -328,10 +332,14 @@ def _compare_with_simulator(recording: Recording | MotionRecording, with_actuato
     return (Finding("simulator", "note" if found.agrees else "warning", text),)
 
 
-def _check_reading(recording: Recording) -> tuple[Finding, ...]:
-    """Warnings about how the recording is to be read."""
-    inertial = recording.arm.parameters if recording.arm.links is not None else None
-    answer = read_rightly(recording, inertial, ReadingTuning())
+def _check_geometry(recording: Recording) -> tuple[Finding, ...]:
+    """Warnings about standstill, and about how the recording is to be read."""
+    tuning, inertial = ReadingTuning(), recording.arm.parameters if recording.arm.links is not None else None
+    return (*compare_standstill(recording, inertial, tuning), *_check_reading(recording, inertial, tuning))
+
+
+def _check_reading(recording: Recording, inertial: Array | None, tuning: ReadingTuning) -> tuple[Finding, ...]:
+    answer: Answer = read_rightly(recording, inertial, tuning)
     findings = [each.finding for each in answer.doubts]
     for each in answer.findings:
         rivals = "".join(f"; or {rival.text}" for rival in each.rivals)

@@ -31,7 +31,7 @@ from armlab.recordings.reading.mistakes import (
 from armlab.recordings.reading.mistakes import spring as with_spring
 from armlab.recordings.reading.reading import OF_LINKS, Mistake, Reading, read_as_is
 from armlab.recordings.reading.signals import thin_channels
-from armlab.recordings.reading.signs import compare_joint_names
+from armlab.recordings.reading.signs import compare_joint_names, compare_standstill
 from armlab.recordings.reading.singles import _is_quarter, search_singles
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording
@@ -453,6 +453,16 @@ def test_columns_that_bear_the_names_of_other_joints_are_named() -> None:
     findings = compare_joint_names(["position_joint2", "position_joint1", "q3"], ARM, "position")
     assert [each.joint for each in findings] == [1, 2]
     assert "joint 2" in findings[0].text
+
+
+def test_torque_at_standstill_against_gravity_is_a_line_of_the_check(tmp_path: Path) -> None:
+    def hold(table: pd.DataFrame) -> None:
+        table.loc[:300, POSITION] = [0.0, 1.2, 0.0]
+        table.loc[:300, TORQUE] = 0.0
+
+    recording = recording_with(tmp_path / "rig", hold)
+    found = compare_standstill(recording, ARM.parameters, replace(TUNING, min_standstill_load=0.2))
+    assert {each.kind for each in found} == {"standstill"}
 
 
 def test_the_check_says_how_a_recording_is_to_be_read(tmp_path: Path) -> None:

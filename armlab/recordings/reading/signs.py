@@ -4,9 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armlab.recordings.recording import Finding, Recording
+from armlab.common.arrays import Array
+from armlab.recordings.reading.tuning import ReadingTuning
+from armlab.recordings.recording import Finding, Recording, Run
 from problem.arm import Arm
+from problem.drive_torque import position_torque
 from problem.joint_words import joint_in_words
+from problem.motion import Motion
+from problem.regressor import rigid_body_torque
 
 
 def compare_joint_names(columns: Sequence[str], arm: Arm, signal: str) -> tuple[Finding, ...]:
@@ -43,3 +48,45 @@ def has_no_sign(recording: Recording) -> bool:
 
 LOW_SHARE = 0.05  # of the largest torque: what counts as zero
 MIN_TOUCHES = 4  # times that a torque comes down to zero
+
+
+def compare_standstill(recording: Recording, inertial: Array | None, tuning: ReadingTuning) -> tuple[Finding, ...]:
+    """Warnings where the torque at standstill is not that which the links of the simulation need against gravity."""
+    if inertial is None:
+        return ()
+    poses = [part for run in recording.runs for part in _standstills(run, tuning)]
+    if not poses:
+        return ()
+    position, torque = (np.array(parts) for parts in zip(*poses, strict=True))
+    still = np.zeros_like(position)
+    at_rest = Motion(position, still, still)
+    gravity = rigid_body_torque(recording.arm, at_rest, inertial) + position_torque(recording.arm, at_rest)
+    scatter = np.max([np.std(run.torque, axis=0) for run in recording.runs], axis=0)
+    out = []
+    for joint in range(len(recording.arm)):
+        needed, held = gravity[:, joint], torque[:, joint]
+        loaded = np.abs(needed) > tuning.min_standstill_load * scatter[joint]
+        if not loaded.any():
+            continue
+        share = float(np.median(held[loaded] / needed[loaded]))
+        if share < tuning.least_standstill_share:
+            own = joint_in_words(recording.arm, joint + 1)
+            text = (
+                f"at standstill {own} holds {np.median(held[loaded]):.3g}, gravity on the links asks for "
+                f"{np.median(needed[loaded]):.3g}: another sign, zero or mounting, or torque without gravity?"
+            )
+            out.append(Finding("standstill", "warning", text, joint + 1))
+    return tuple(out)
+
+
+def _standstills(run: Run, tuning: ReadingTuning) -> list[tuple[Array, Array]]:
+    """Mean position and torque of each stretch in which no joint moves."""
+    width = max(round(tuning.standstill_s * run.rate_hz), 2)
+    count = run.samples // width
+    if count == 0:
+        return []
+    position = run.position[: count * width].reshape(count, width, -1)
+    moved = np.ptp(position, axis=1)
+    still = np.all(moved <= tuning.still_travel * np.maximum(np.ptp(run.position, axis=0), 1e-9), axis=1)
+    torque = run.torque[: count * width].reshape(count, width, -1).mean(axis=1)
+    return [(position[place].mean(axis=0), torque[place]) for place in np.flatnonzero(still)]

@@ -132,3 +132,13 @@ class ReadingTuning:
     max_unexplained: float = tuned(
         0.6, unit="of the torque's scatter", meaning="what an arm of the right geometry and reading leaves at most"
     )
+    standstill_s: float = tuned(0.3, unit="s", meaning="length of a stretch in which an arm stands still", least=0.01)
+    still_travel: float = tuned(
+        2e-3, unit="of a joint's travel", meaning="a joint that moves less in such a stretch stands still"
+    )
+    min_standstill_load: float = tuned(
+        1.0, unit="of the torque's scatter", meaning="gravity torque from which on standstill tells something"
+    )
+    least_standstill_share: float = tuned(
+        0.2, meaning="a joint that holds less of its gravity torque at standstill is read wrongly"
+    )
