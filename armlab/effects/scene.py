@@ -24,7 +24,8 @@ class Scene:
     time: (samples,), s, from the first sample of the run. inertial: (10 * joints,), the links of the present
     model. torque: (samples, joints), what the present model predicts, friction included, faults of the torque's
     channel left out, N m (N). temperature: (samples, sensors), degrees Celsius; link_position: (samples, joints),
-    rad (m); None where the run has none.
+    rad (m); None where the run has none. beside: (samples, joints), N m (N), torque simulated elsewhere that the model
+    adds to; None where the model is the whole torque.
     """
 
     run: str
@@ -35,13 +36,14 @@ class Scene:
     torque: Array
     temperature: Array | None = None
     link_position: Array | None = None
+    beside: Array | None = None
 
     def __post_init__(self) -> None:
         """Make the arrays read-only for laws: what one writes, all others would see."""
         moved = self.motion
         shown = [_read_only(each) for each in (moved.position, moved.velocity, moved.acceleration)]
         object.__setattr__(self, "motion", Motion(*shown))
-        for name in ("time", "inertial", "torque", "temperature", "link_position"):
+        for name in ("time", "inertial", "torque", "temperature", "link_position", "beside"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, _read_only(getattr(self, name)))
 

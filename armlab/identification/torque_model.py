@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.common.errors import InputError
 from armlab.common.probabilities import normal_quantile
 from armlab.effects.model import FittedEffect, torque_in_mechanism, torque_of_model
 from armlab.effects.parameters import ParameterValue, parameter_values
@@ -20,6 +21,8 @@ from problem.arm import Arm
 from problem.drive_torque import compensation_torque
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
+
+ADDS_TO, SIMULATED_TORQUE = "adds_to", "simulated_torque"  # in the provenance
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +57,11 @@ class TorqueModel:
         return self.structure.arm
 
     @property
+    def is_difference(self) -> bool:
+        """Whether it adds to a torque that was simulated elsewhere, which a recording has in columns of its own."""
+        return self.provenance.get(ADDS_TO) == SIMULATED_TORQUE
+
+    @property
     def base_values(self) -> Array:
         """Base parameters, (base,)."""
         return self.values[: len(self.structure.base)]
@@ -81,10 +89,11 @@ class TorqueModel:
         """Torque of a motion, (samples, joints), N m (N).
 
         run: where the motion comes from, sample by sample. Without it the samples count as single instants; ValueError
-        where an effect depends on their order in time.
+        where an effect depends on their order in time. InputError where the model adds to a simulated torque that the
+        run has not.
         """
         if run is not None:
-            return self.torque_in(scene_of(run, motion, self.arm))
+            return self.torque_in(self._scene_of(run, motion))
         in_time = [part.label for part in self.structure.components if part.of_time]
         if in_time:
             raise ValueError(f"torque of {', '.join(in_time)} needs the run of the motion, for its times")
@@ -100,7 +109,11 @@ class TorqueModel:
 
     def _rigid_scene(self, scene: Scene) -> Scene:
         rigid = rigid_body_torque(self.arm, scene.motion, self.links)
-        return replace(scene, inertial=self.links, torque=rigid - compensation_torque(self.arm, scene.motion))
+        own = rigid - compensation_torque(self.arm, scene.motion)
+        if scene.beside is None:
+            return replace(scene, inertial=self.links, torque=own)
+        links = self.links if self.structure.load is None else self.structure.load
+        return replace(scene, inertial=links, torque=own + scene.beside)
 
     def filtered_torque(self, signals: Signals) -> Array:
         """Torque that passed the filter of the recorded one, (kept, joints)."""
@@ -111,9 +124,17 @@ class TorqueModel:
         return signals_of(run, self.cutoff_hz, self.position_factor)
 
     def predict(self, run: Run) -> Array:
-        """Torque at every sample of a run, (samples, joints), by the cut-off of the identification."""
+        """Torque at every sample of a run, (samples, joints), by the cut-off of the identification; see `torque`."""
         signals = self.signals(run)
         return self.torque(signals.motion, signals.run)
+
+    def _scene_of(self, run: Run, motion: Motion) -> Scene:
+        scene = scene_of(run, motion, self.arm)
+        if not self.is_difference:
+            return scene
+        if run.simulated_torque is None:
+            raise InputError(f"{run.name}: the model adds to columns of {SIMULATED_TORQUE}, which this run has not")
+        return replace(scene, beside=run.simulated_torque)
 
     @property
     def base_parameters(self) -> tuple[ParameterValue, ...]:

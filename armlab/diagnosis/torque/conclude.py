@@ -140,14 +140,14 @@ def _assemble(
         found = _delivered(plain, found, observed, claims)
     alone = build_model(recording, simulation, prediction.with_names_alone(named), named, {})
     alone = with_smoothing_of(found, alone)
-    final = filtered_residual(found, observed, simulation)
+    final = filtered_residual(found, observed)
     refit = model.residual(model.solver.fit(State((), None)))
     start = refit if simulation.kind == "refit" else design.target
     noise = final.copy()
     for each in unknowns:
         noise[:, each.joint] -= each.prediction
     floor = noise_floor(noise, design.features, observed, tuning.surrogate)
-    fits = joint_fits(refit, (found, alone), plain, floor, observed, simulation, tuning)
+    fits = joint_fits(refit, (found, alone), plain, floor, observed, tuning)
     parts = explain_error(prediction.model, observed, claims, (start, final), floor)
     claims = without_lesser_unknowns(claims, parts)
     parts = explain_error(prediction.model, observed, claims, (start, final), floor)

@@ -26,7 +26,6 @@ from armlab.diagnosis.torque.rows.noise import Noise
 from armlab.diagnosis.torque.rows.simulation import Simulation
 from armlab.diagnosis.torque.search.surrogate import FoldedFeatures
 from armlab.effects.contract import Candidate, Family, Scene
-from armlab.effects.scene import scene_of
 from armlab.recordings.differentiate import Signals
 from problem.base_parameters import BaseParameters
 from problem.motion import Motion
@@ -149,7 +148,7 @@ def build_design_matrix(
 
 
 def _scene_of_run(signals: Signals, motion: Motion, simulation: Simulation, inertial: Array) -> Scene:
-    bare = scene_of(signals.run, motion, simulation.arm)
+    bare = simulation.scene_of(signals.run, motion)
     return replace(bare, inertial=inertial, torque=simulation.torque_in_mechanism(bare))
 
 

@@ -14,7 +14,6 @@ from armlab.diagnosis.torque.predict.prediction import (
 )
 from armlab.diagnosis.torque.predict.yardstick import Yardstick
 from armlab.diagnosis.torque.rows.data import Observed, rows_in
-from armlab.diagnosis.torque.rows.simulation import Simulation
 from armlab.diagnosis.tuning import Tuning
 from armlab.identification.identifier import Identifier
 from armlab.identification.torque_model import TorqueModel
@@ -26,7 +25,6 @@ def joint_fits(
     plain: Yardstick | None,
     floor: Array,
     observed: Observed,
-    simulation: Simulation,
     tuning: Tuning,
 ) -> tuple[JointFit, ...]:
     """The fits of all joints. refit: residual (rows, joints) of the refitted rigid arm; models: the one that is found,
@@ -38,10 +36,10 @@ def joint_fits(
     identified = with_smoothing_of(
         found, Identifier(found.arm, cutoff_hz=None if plain is None else plain.cutoff_hz).fit(runs).model_
     )
-    every = ((found, simulation), (alone, simulation), (identified, None))
+    every = (found, alone, identified)
     left = None if plain is None else plain.residual(observed)
-    filtered = [refit, *(filtered_residual(each, observed, beside) for each, beside in every)]
-    recorded = [recorded_residual(each, observed, beside) for each, beside in ((rigid, None), *every)]
+    filtered = [refit, *(filtered_residual(each, observed) for each in every)]
+    recorded = [recorded_residual(each, observed) for each in (rigid, *every)]
     out = []
     for joint, noise in enumerate(floor.tolist()):
         rows = rows_in(observed.of_role("validate", joint), observed.rows)

@@ -19,7 +19,7 @@ from armlab.effects.parameters import ParameterValue, parameter_values
 from armlab.identification.model_file import base_covariance
 from armlab.identification.recorded_motion import RecordedMotion
 from armlab.identification.structure import Structure
-from armlab.identification.torque_model import TorqueModel
+from armlab.identification.torque_model import ADDS_TO, SIMULATED_TORQUE, TorqueModel
 from armlab.recordings.recording import Recording
 from problem.robot_file import built_in_arms
 
@@ -53,21 +53,26 @@ def build_model(
     claims: Mapping[int, Claim],
     notes: dict[str, Any],
 ) -> TorqueModel:
-    """The model of a fit. claims: by group; what has none is present without a claim. notes: for the provenance."""
-    inertial = inertial_parameters(fitted)
-    simulated = _simulated_terms(simulation)
+    """The model of a fit. claims: by group; what has none is present without a claim. notes: for the provenance.
+
+    Beside a torque that was simulated elsewhere the model is the difference to it.
+    """
+    inertial, is_difference = inertial_parameters(fitted), simulation.kind == "simulated"
+    simulated = [] if is_difference else _simulated_terms(simulation)
     terms = [*simulated, *_fitted_terms(fitted, claims)]
     structure = Structure(simulation.arm, tuple(term[0] for term in terms), load=inertial)
-    base = structure.base.values(inertial)
+    known = simulation.inertial
+    own = inertial - known if is_difference and known is not None else inertial
+    base = structure.base.values(own)
     covariance = fitted.base_parameters()[1]
     return TorqueModel(
         robot=_robot_path(recording),
         structure=structure,
         values=np.concatenate([base, *(term[1] for term in terms)]),
         covariance=base_covariance(covariance, structure),
-        inertial=inertial if simulation.inertial is not None else None,
+        inertial=inertial if known is not None and not is_difference else None,
         cutoff_hz=fitted.design.observed.cutoff_hz,
-        provenance=_provenance(recording, notes),
+        provenance=_provenance(recording, notes | ({ADDS_TO: SIMULATED_TORQUE} if is_difference else {})),
         stated=tuple(term[2] for term in terms),
         unclaimed=frozenset(number for number, term in enumerate(terms) if not term[3]),
         simulated=frozenset(range(len(simulated))),

@@ -22,7 +22,6 @@ from armlab.diagnosis.torque.columns.links import Widths
 from armlab.diagnosis.torque.columns.solver import State
 from armlab.diagnosis.torque.rows.data import Observed, observe, rows_in
 from armlab.diagnosis.torque.rows.noise import Noise, fit_noise
-from armlab.diagnosis.torque.rows.simulation import Simulation
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_values, follow_model
 from armlab.diagnosis.torque.search.refine import prior_precision
 from armlab.diagnosis.torque.search.search import Search, Step
@@ -444,23 +443,11 @@ def with_smoothing_of(model: TorqueModel, other: TorqueModel) -> TorqueModel:
     return replace(other, position_factor=model.position_factor * model.cutoff_hz / other.cutoff_hz)
 
 
-def filtered_residual(model: TorqueModel, observed: Observed, beside: Simulation | None = None) -> Array:
-    """Measured torque less that of a model through the same filter, (rows, joints), N m (N).
-
-    beside: a simulation whose torque may stand in the recording, so that the model holds the difference to it alone.
-    """
-    return np.concatenate([each.torque - each.filter(_predicted(model, each.run, beside)) for each in observed.signals])
+def filtered_residual(model: TorqueModel, observed: Observed) -> Array:
+    """Measured torque less that of a model through the same filter, (rows, joints), N m (N)."""
+    return np.concatenate([each.torque - each.filter(model.predict(each.run)) for each in observed.signals])
 
 
-def recorded_residual(model: TorqueModel, observed: Observed, beside: Simulation | None = None) -> Array:
-    """Torque as recorded less that of a model at the kept rows, (rows, joints), N m (N); beside: as above."""
-    parts = [(each.run.torque - _predicted(model, each.run, beside))[each.filter.rows] for each in observed.signals]
-    return np.concatenate(parts)
-
-
-def _predicted(model: TorqueModel, run: Run, beside: Simulation | None) -> Array:
-    """Torque of a model, and of what was simulated beside the recording where it holds the difference to that."""
-    predicted = model.predict(run)
-    if beside is None or beside.kind != "simulated" or run.simulated_torque is None:
-        return predicted
-    return predicted + run.simulated_torque
+def recorded_residual(model: TorqueModel, observed: Observed) -> Array:
+    """Torque as recorded less that of a model at the kept rows, (rows, joints), N m (N)."""
+    return np.concatenate([(each.run.torque - model.predict(each.run))[each.filter.rows] for each in observed.signals])

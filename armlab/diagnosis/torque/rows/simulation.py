@@ -1,6 +1,6 @@
 """The simulation that a recording is compared with, and recordings that cannot be compared with any."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,8 +28,9 @@ MAX_LAW_ERROR = 1e-6  # of the largest torque: more is another law
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """kind: the baseline. inertial: (10 * joints,) of its links, None where there are none. model: its friction
-    and other terms, None for a robot file that states links and rotors alone.
+    """kind: the baseline. inertial: (10 * joints,) of its links, None where there are none; beside a torque that was
+    simulated elsewhere they say how large a change of a link may be. model: its friction and other terms, None for a
+    robot file that states links and rotors alone, and beside such a torque.
     """
 
     kind: Baseline
@@ -59,10 +60,14 @@ class Simulation:
 
     def torque(self, scene: Scene) -> Array:
         """Simulated torque of the motion of a scene, (samples, joints); zeros where there is no simulation."""
+        if scene.beside is not None:
+            return scene.beside
         return self._rigid_torque(scene) if self.model is None else self.model.torque_in(scene)
 
     def torque_in_mechanism(self, scene: Scene) -> Array:
         """The same without faults of the torque's channel, which act on what is recorded alone."""
+        if scene.beside is not None:
+            return scene.beside
         return self._rigid_torque(scene) if self.model is None else self.model.torque_in_mechanism(scene)
 
     def _rigid_torque(self, scene: Scene) -> Array:
@@ -74,17 +79,17 @@ class Simulation:
             out = out + np.asarray(self.arm.rotor_inertia) * scene.motion.acceleration
         return out
 
+    def beside(self, run: Run) -> Array | None:
+        """Torque of a run that was simulated elsewhere, (samples, joints), where that is what is compared with."""
+        return run.simulated_torque if self.kind == "simulated" else None
+
+    def scene_of(self, run: Run, motion: Motion) -> Scene:
+        """The scene of a run and of its motion, with what was simulated beside it."""
+        return replace(scene_of(run, motion, self.arm), beside=self.beside(run))
+
     def filtered(self, signals: Signals) -> Array:
         """Simulated torque through the filter of the measured one, (kept, joints)."""
-        return np.asarray(
-            signals.filter(self.torque_as_recorded(scene_of(signals.run, signals.motion, self.arm), signals.run))
-        )
-
-    def torque_as_recorded(self, scene: Scene, run: Run) -> Array:
-        """Simulated torque at every sample of a run, (samples, joints): that of the file, or that of its motion."""
-        if self.kind == "simulated" and run.simulated_torque is not None:
-            return run.simulated_torque
-        return self.torque(scene)
+        return np.asarray(signals.filter(self.torque(self.scene_of(signals.run, signals.motion))))
 
 
 def _is_of_speed(candidate: Candidate) -> bool:
@@ -113,10 +118,11 @@ def read_simulation(recording: Recording, baseline: Baseline | None) -> Simulati
     if kind == "simulated" and not _has_simulated_torque(recording):
         raise InputError(f"--baseline simulated: not every run of {recording.name} has columns of simulated_torque")
     arm = recording.arm
+    links = arm.parameters if arm.links is not None else None
+    if kind == "simulated":
+        return Simulation(kind, arm, links)
     if recording.simulation is None:
-        return Simulation(
-            kind, arm, arm.parameters if arm.links is not None else None, nominal_model(arm, recording.robot)
-        )
+        return Simulation(kind, arm, links, nominal_model(arm, recording.robot))
     model = read_model(recording.simulation)
     if len(model.arm) != len(arm):
         joints = f"{len(model.arm)} joints, the recording {len(arm)}"
