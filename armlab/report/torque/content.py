@@ -38,7 +38,7 @@ from armlab.report.words import (
     variables_in_words,
 )
 from problem.arm import Arm
-from problem.joint_words import joint_in_table, joint_in_words
+from problem.joint_words import joint_in_table, joint_in_words, links_in_words
 
 
 @dataclass(frozen=True)
@@ -98,12 +98,20 @@ def cause_table(diagnosis: Diagnosis) -> Table | None:
     rows = []
     for each in told:
         own = account.findings_of(each)
-        place = cause_place(diagnosis, each, own) or ("which is not told" if each.cause == LINKS else "the whole arm")
+        place = cause_place(diagnosis, each, own) or _place_of_all(diagnosis, each, own)
         share, size = format_share(each.share), _cause_size(diagnosis, each)
         rows.append([cause_name(each, own), place, size, share, _how_sure(own)])
     if open_share(account) > 1 - STATED_SHARE:
         rows.append(["unnamed", "", "", format_share(open_share(account)), ""])
     return Table(["cause", "where", "how large", "of the error", "how sure"], rows, (0, 1, 2, 4), stacked=True)
+
+
+def _place_of_all(diagnosis: Diagnosis, cause: StatedCause, own: Sequence[StatedFinding]) -> str:
+    """Of a cause without a place of its own: links are missed most at one, which need not be the one that is off."""
+    joint = own[0].claim.joint
+    if cause.cause != LINKS or joint is None:
+        return "the whole arm"
+    return f"missed most at {links_in_words(diagnosis.simulation.arm, [joint])}, which is off is not certain"
 
 
 def _cause_size(diagnosis: Diagnosis, cause: StatedCause) -> str:
@@ -301,8 +309,8 @@ def uses(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.is_plain:
         held = "plain least squares, which predicts blocks of these runs better than a model with the named effects"
     use = [
-        f"model.yaml beside this page holds {held}: `armlab predict model.yaml RECORDING` compares it with another "
-        "recording.",
+        f"Take model.yaml beside this page, which holds {held}: `armlab predict model.yaml RECORDING` compares it with "
+        "another recording.",
         _export_text(diagnosis),
     ]
     return asked + use
