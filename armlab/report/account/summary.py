@@ -99,28 +99,19 @@ class _Writer:
             if len(longer.split()) > MAX_FIRST_WORDS:
                 break
             sentence = longer
-        open_share = 1 - sum(each.share for each in self.account.causes)
-        longer = f"{sentence}; {100 * open_share:.0f} % has no sure name"
-        if open_share > 1 - STATED_SHARE and len(longer.split()) <= MAX_FIRST_WORDS:
+        unnamed = open_share(self.account)
+        longer = f"{sentence}; {100 * unnamed:.0f} % is unnamed"
+        if unnamed > 1 - STATED_SHARE and len(longer.split()) <= MAX_FIRST_WORDS:
             sentence = longer
         return f"{sentence}."
 
     def cause_in_words(self, cause: StatedCause) -> str:
         """The cause with its place: by its name where its findings have one."""
-        arm = self.diagnosis.simulation.arm
         own = self.account.findings_of(cause)
-        joints = sorted({each.claim.joint for each in own if each.claim.joint is not None})
+        name, place = cause_name(cause, own), cause_place(self.diagnosis, cause, own)
         if cause.cause == LINKS:
-            name = _name_of_links(own)
-            joints = [] if all(is_of_unknown_links(each.claim) for each in own) else joints
-            return f"{name} of {links_in_words(arm, joints)}" if joints else f"{LINKS_IN_WORDS} of the links"
-        if cause.cause == UNKNOWN_CAUSE:
-            name = "something without a name"
-        elif cause.cause == FRICTION:
-            name = _name_of_friction(own)
-        else:
-            name = _name_of(own)
-        return f"{name} at {joints_in_words(arm, joints)}" if joints else name
+            return f"{name} of {place or 'the links'}"
+        return f"{name} at {place}" if place else name
 
     def _figures(self) -> Iterator[str]:
         for cause in self.account.leading:
@@ -129,28 +120,11 @@ class _Writer:
                 yield from self._other_figures(cause)
 
     def _friction_figures(self, cause: StatedCause) -> Iterator[str]:
-        """Of one joint at both speeds, of several the least and the most at their higher speeds; also behind play."""
-        arm = self.diagnosis.simulation.arm
-        joints = {each.claim.joint for each in self.account.findings_of(cause) if each.is_friction}
-        own = (each for each in self.account.friction if each.joint in joints and each.torque[1] > 0)
-        rows = sorted(own, key=lambda each: each.torque[1])  # torque along the motion is no friction
-        if not rows:
-            return
-        low, high = rows[0], rows[-1]
-        unit = joint_unit(arm, high.joint - 1)
-        if low is high:
-            speed = speed_unit(unit)
-            sizes = [
-                f"{format_number(torque)} {unit} at {format_number(at, 2)} {speed}"
-                for torque, at in zip(high.torque, high.speeds, strict=True)
-            ]
-            yield f"friction is {join_words(sizes)}"
-            return
-        yield (
-            f"friction at higher speeds is {format_number(low.torque[1])} {joint_unit(arm, low.joint - 1)} "
-            f"({joint_in_words(arm, low.joint)}) to {format_number(high.torque[1])} {unit} "
-            f"({joint_in_words(arm, high.joint)})"
-        )
+        sizes = friction_sizes(self.diagnosis, self.account, cause)
+        if len(sizes) == 1:
+            yield f"friction is {sizes[0]}"
+        elif sizes:
+            yield f"friction at higher speeds is {' to '.join(sizes)}"
 
     def _other_figures(self, cause: StatedCause) -> Iterator[str]:
         largest = self.account.findings_of(cause)[:1]
@@ -185,6 +159,52 @@ class _Writer:
         fits = [each for each in self.diagnosis.fit if each.joint - 1 in joints]
         best = max(fits, key=lambda each: start[each.joint - 1] / max(each.after, 1e-300))
         return best, float(start[best.joint - 1])
+
+
+def cause_name(cause: StatedCause, own: Sequence[StatedFinding]) -> str:
+    """What is wrong, by the names of its findings where these are sure and few."""
+    if cause.cause == UNKNOWN_CAUSE:
+        return "something without a name"
+    if cause.cause == LINKS:
+        return _name_of_links(own)
+    return _name_of_friction(own) if cause.cause == FRICTION else _name_of(own)
+
+
+def cause_place(diagnosis: Diagnosis, cause: StatedCause, own: Sequence[StatedFinding]) -> str:
+    """The joints or links of a cause; empty for the whole arm, and for links of which the data do not tell."""
+    arm = diagnosis.simulation.arm
+    joints = sorted({each.claim.joint for each in own if each.claim.joint is not None})
+    if cause.cause != LINKS:
+        return joints_in_words(arm, joints) if joints else ""
+    return "" if all(is_of_unknown_links(each.claim) for each in own) else links_in_words(arm, joints)
+
+
+def friction_sizes(diagnosis: Diagnosis, account: Account, cause: StatedCause) -> tuple[str, ...]:
+    """The friction of a cause: of one joint at both speeds, of several the least and the most at their higher speeds.
+
+    Also where friction stands behind play; empty where there is none.
+    """
+    arm = diagnosis.simulation.arm
+    joints = {each.claim.joint for each in account.findings_of(cause) if each.is_friction}
+    own = (each for each in account.friction if each.joint in joints and each.torque[1] > 0)
+    rows = sorted(own, key=lambda each: each.torque[1])  # torque along the motion is no friction
+    if not rows:
+        return ()
+    low, high = rows[0], rows[-1]
+    if low is high:
+        unit = joint_unit(arm, high.joint - 1)
+        pairs = zip(high.torque, high.speeds, strict=True)
+        sizes = [f"{format_number(torque)} {unit} at {format_number(at, 2)} {speed_unit(unit)}" for torque, at in pairs]
+        return (join_words(sizes),)
+    return tuple(
+        f"{format_number(each.torque[1])} {joint_unit(arm, each.joint - 1)} ({joint_in_words(arm, each.joint)})"
+        for each in (low, high)
+    )
+
+
+def open_share(account: Account) -> float:
+    """The share of the error that no cause explains."""
+    return 1 - sum(each.share for each in account.causes)
 
 
 def errors_at_start(diagnosis: Diagnosis) -> Sequence[float]:

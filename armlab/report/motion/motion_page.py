@@ -18,8 +18,14 @@ from armlab.report.motion.motion_words import (
     summary_of,
 )
 from armlab.report.motion.stated_numbers import stated_numbers
+from armlab.report.words import format_chance
 from problem.joint_words import joint_at_start, joint_in_table
 
+USE = (
+    "Take the simulation with these numbers: `simulation.xml` as MJCF for MuJoCo; `robot.urdf` and `controllers.yaml` "
+    "for ROS 2, `isaaclab_actuators.py` for Isaac Lab, `mjlab_actuators.py` for mjlab. Each says what it does not "
+    "hold; `servo_plugin.py` adds the rest to a simulation in MuJoCo."
+)
 SHOWN_S = 20.0  # of the longest held-out run, in the figures
 
 
@@ -40,6 +46,7 @@ def motion_page(diagnosis: MotionDiagnosis, command: str) -> str:
         known=known,
         joints=joint_table(diagnosis) if known else None,
         steps=_next_recordings(diagnosis),
+        uses=[USE] if known else [],
         errors=_error_table(diagnosis) if known else None,
         tool=_tool_text(diagnosis),
         replayed=pictures[shown : shown + 1],
@@ -57,12 +64,13 @@ def joint_table(diagnosis: MotionDiagnosis) -> Table:
     rows, arm = [], diagnosis.simulation.arm
     for each in diagnosis.errors:
         stated = [one for one in stated_numbers(diagnosis) if not one.minor]
-        own = [one.finding for one in stated if one.finding.joint == each.joint]
-        words = "; ".join(finding_with_numbers(finding) for finding in own) or "–"
-        before = "–" if each.replay_before is None else f"{1e3 * each.replay_before:.3g} mrad"
-        rows.append((joint_in_table(arm, each.joint), words, before, f"{1e3 * each.replay_after:.3g} mrad"))
-    headings = ("joint", "what is wrong, 95 % interval", "replay error before", "after")
-    return Table(headings, rows, (1,), stacked=True)
+        own = [one for one in stated if one.finding.joint == each.joint]
+        words = "; ".join(finding_with_numbers(one.finding) for one in own)
+        sure = "; ".join(format_chance(one.statement.probability) for one in own)
+        before = "" if each.replay_before is None else f"{1e3 * each.replay_before:.3g} mrad"
+        rows.append((joint_in_table(arm, each.joint), words, sure, before, f"{1e3 * each.replay_after:.3g} mrad"))
+    headings = ("joint", "what is wrong, 95 % interval", "how sure", "replay error before", "after")
+    return Table(headings, rows, (1, 2), stacked=True)
 
 
 def _next_recordings(diagnosis: MotionDiagnosis) -> list[str]:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from textwrap import wrap
 
-from armlab.common.report.wording import count_of, format_unit, join_words
+from armlab.common.report.wording import count_of, format_number, format_unit, join_words
 from armlab.diagnosis.motion.motion_result import MotionDiagnosis, ReplayError, ServoFinding
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT
 from armlab.diagnosis.motion.witness import CurrentWitness
@@ -103,7 +103,7 @@ def _replay_sentence(diagnosis: MotionDiagnosis) -> str:
     arm = diagnosis.simulation.arm
     if any(each.replay_before is None for each in diagnosis.errors):
         worst = max(diagnosis.errors, key=lambda each: each.replay_after / max(each.spread, 1e-300))
-        left = f"{1e3 * worst.replay_after:.3g} mrad, {100 * worst.replay_after / max(worst.spread, 1e-300):.0f} %"
+        left = f"{1e3 * worst.replay_after:.3g} mrad, {_share_of_motion(worst)}"
         return f"With what was found the replay error of {joint_in_words(arm, worst.joint)} is {left} of its motion."
     if diagnosis.status == "none":
         worst = max(diagnosis.errors, key=lambda each: each.replay_after)
@@ -113,8 +113,12 @@ def _replay_sentence(diagnosis: MotionDiagnosis) -> str:
     falls = "falls" if after < before else "does not fall:"
     return (
         f"On held-out runs the replay error of {joint_in_words(arm, best.joint)} {falls} from {before:.3g} mrad to "
-        f"{after:.3g} mrad, {100 * best.replay_after / max(best.spread, 1e-300):.0f} % of its motion."
+        f"{after:.3g} mrad, {_share_of_motion(best)} of its motion."
     )
+
+
+def _share_of_motion(error: ReplayError) -> str:
+    return f"{format_number(100 * error.replay_after / max(error.spread, 1e-300), 2)} %"
 
 
 def remarks(diagnosis: MotionDiagnosis) -> list[str]:

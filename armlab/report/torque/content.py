@@ -9,18 +9,22 @@ from markupsafe import Markup
 from armlab.common.report.page import Table
 from armlab.common.report.wording import count_of, format_number, join_words
 from armlab.diagnosis.result import Claim, Diagnosis
+from armlab.diagnosis.torque.names.findings import FRICTION, STATED_SHARE, StatedCause
+from armlab.diagnosis.torque.predict.parts import LINKS
 from armlab.effects.library import effect_named
 from armlab.identification.export import has_place_in_simulator
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER
 from armlab.report.account.account import StatedFinding, account_of, finding_errors
-from armlab.report.account.next_steps import next_steps
+from armlab.report.account.summary import cause_name, cause_place, friction_sizes, open_share
 from armlab.report.torque.gallery import Gallery
 from armlab.report.torque.residuals import ShownResiduals, correlation_seconds, filter_correlation_seconds, is_white
+from armlab.report.torque.sentences import claim_figures
 from armlab.report.words import (
     PARAMETER_DIGITS,
     compared_in_words,
     effect_in_words,
     finding_in_words,
+    format_chance,
     format_gap,
     format_growth,
     format_probability,
@@ -34,7 +38,7 @@ from armlab.report.words import (
     variables_in_words,
 )
 from problem.arm import Arm
-from problem.joint_words import joint_in_table, joint_in_words
+from problem.joint_words import joint_in_table, joint_in_words, links_in_words
 
 
 @dataclass(frozen=True)
@@ -80,19 +84,59 @@ def error_note(diagnosis: Diagnosis, data: ShownResiduals) -> str:
         return f"{errors} On held-out data."
     return (
         "Shares are of the squared error above the noise, of all joints together, each in units of its own torque. "
+        "How sure: probability of the name, or of the few names, of each finding. "
         f"{errors} All on held-out data."
     )
 
 
 def cause_table(diagnosis: Diagnosis) -> Table | None:
-    """The causes with their findings, the largest first; None without findings."""
+    """The causes that are told, the largest first: where, how large, of the error, how sure; None without any."""
+    account = account_of(diagnosis)
+    told = [each for each in account.causes if account.findings_of(each)]
+    if not told:
+        return None
     rows = []
-    for each in account_of(diagnosis).causes:
-        names = dict.fromkeys(effect_in_words(diagnosis.claims[place].effect) for place in each.findings)
-        joints = ", ".join(joint_in_table(diagnosis.simulation.arm, joint) for joint in each.joints) or "all"
-        rows.append([each.cause.replace("_", " "), joints, format_share(each.share), join_words(list(names))])
-    headings = ["cause", "joints", "share of the error", "findings"]
-    return Table(headings, rows, (0, 1, 3), stacked=True) if rows else None
+    for each in told:
+        own = account.findings_of(each)
+        place = cause_place(diagnosis, each, own) or _place_of_all(diagnosis, each, own)
+        share, size = format_share(each.share), _cause_size(diagnosis, each)
+        rows.append([cause_name(each, own), place, size, share, _how_sure(own)])
+    if open_share(account) > 1 - STATED_SHARE:
+        rows.append(["unnamed", "", "", format_share(open_share(account)), ""])
+    return Table(["cause", "where", "how large", "of the error", "how sure"], rows, (0, 1, 2, 4), stacked=True)
+
+
+def _place_of_all(diagnosis: Diagnosis, cause: StatedCause, own: Sequence[StatedFinding]) -> str:
+    """Of a cause without a place of its own: links are missed most at one, which need not be the one that is off."""
+    joint = own[0].claim.joint
+    if cause.cause != LINKS or joint is None:
+        return "the whole arm"
+    return f"missed most at {links_in_words(diagnosis.simulation.arm, [joint])}, which is off is not certain"
+
+
+def _cause_size(diagnosis: Diagnosis, cause: StatedCause) -> str:
+    """The friction of a cause at its joints, then the numbers of what else it has."""
+    account, arm = account_of(diagnosis), diagnosis.simulation.arm
+    sizes, own = friction_sizes(diagnosis, account, cause), account.findings_of(cause)
+    texts = [f"{' to '.join(sizes)}{' at higher speeds' if len(sizes) > 1 else ''}"] if sizes else []
+    if cause.cause == FRICTION:
+        return "".join(texts)
+    texts = [f"friction {each}" for each in texts]
+    places = {each.claim.joint for each in own}
+    for each in own:
+        if numbers := claim_figures(each.claim, diagnosis.simulation):
+            joint = each.claim.joint
+            texts.append(f"{joint_in_words(arm, joint)}: {numbers}" if joint and len(places) > 1 else numbers)
+    return "; ".join(texts)
+
+
+def _how_sure(own: Sequence[StatedFinding]) -> str:
+    """The probability of the least and of the most certain finding of a cause, and whether their names are certain."""
+    chances = sorted(each.statement.probability for each in own)
+    ends = dict.fromkeys(format_chance(each) for each in (chances[0], chances[-1]))
+    is_sure = all(each.statement.kind == "name" for each in own)
+    doubt = "" if is_sure else ", law not certain" if len(own) == 1 else ", not each law certain"
+    return f"{' to '.join(ends)}{doubt}"
 
 
 def setup_part(diagnosis: Diagnosis) -> SetupPart | None:
@@ -254,19 +298,19 @@ def located_table(diagnosis: Diagnosis) -> Table:
     return Table(headings, rows, (2, 3, 4), stacked=True)
 
 
-def steps_and_uses(diagnosis: Diagnosis) -> list[str]:
-    """What decides what is open, and what to do with the model."""
+def uses(diagnosis: Diagnosis) -> list[str]:
+    """What to do with the verdict and with the model."""
     if not diagnosis.fit:
         return []
-    asked = list(next_steps(diagnosis, account_of(diagnosis)))
+    asked = list[str]()
     if any(_motion_may_tell(claim) for claim in diagnosis.claims):
         asked.append("`armlab next verdict.json --robot ROBOT` designs a motion that decides between rivals.")
     held = "the links and every named effect"
     if diagnosis.is_plain:
         held = "plain least squares, which predicts blocks of these runs better than a model with the named effects"
     use = [
-        f"model.yaml beside this page holds {held}: `armlab predict model.yaml RECORDING` compares it with another "
-        "recording.",
+        f"Take model.yaml beside this page, which holds {held}: `armlab predict model.yaml RECORDING` compares it with "
+        "another recording.",
         _export_text(diagnosis),
     ]
     return asked + use

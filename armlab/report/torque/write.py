@@ -18,6 +18,8 @@ from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.diagnosis.tuning import parse_change
 from armlab.recordings.load import load_recording
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER
+from armlab.report.account.account import account_of
+from armlab.report.account.next_steps import next_steps
 from armlab.report.signals_file import SIGNALS_FILE, check_signals_writer, diagnosis_tracks, signals_content
 from armlab.report.torque import content, measured
 from armlab.report.torque.gallery import Gallery, draw_gallery
@@ -47,7 +49,8 @@ def report_page(diagnosis: Diagnosis, gallery: Gallery | None, command: str) -> 
         joints=measured.joint_table(diagnosis) if diagnosis.claims else None,
         bodies=measured.body_sentences(diagnosis),
         free_joints=measured.joints_without_finding(diagnosis),
-        steps=content.steps_and_uses(diagnosis),
+        steps=next_steps(diagnosis, account_of(diagnosis)),
+        uses=content.uses(diagnosis),
         gallery=gallery,
         origin=content.origin_of(diagnosis, command),
         **more,
