@@ -1,0 +1,66 @@
+"""Pairs that resemble real recordings: a robot of the field tier on two days, with nothing changed or one thing.
+
+What is known of the numbers of a change: a gain and a zero. Friction of the field is no level and no slope, and warms;
+a load is read through the gains of the drives.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armlab.proof.blind.field.field_hidden import FIELD_CHANGES, FieldEffect, draw_field_change
+from armlab.proof.blind.field.field_plan import FieldPlan, new_side
+from armlab.proof.blind.field.field_runs import simulate_field
+from armlab.proof.blind.field.field_score import LEAST_STRENGTH
+from armlab.proof.blind.field.field_sizes import draw_sized
+from armlab.proof.blind.field.files import write_field_observation
+from armlab.proof.blind.pairs.pair_cases import SIDES, known_differences, write_answer
+
+
+def write_field_pair(plan: FieldPlan, observation: Path, truth: Path) -> None:
+    """Writes the recording folders `old` and `new`, and the answer. plan: of the old side."""
+    old, later = simulate_field(plan), new_side(plan)
+    new = simulate_field(later, rest_factors=old.rest_factors)
+    kind, strength = "null", 0.0
+    changed: list[dict[str, Any]] = []
+    if plan.kind == "pair changed":
+        kinds: list[str] = []
+
+        def draw(rng: np.random.Generator, number: int) -> FieldEffect:
+            kinds.append(FIELD_CHANGES[(plan.index + number // 3) % len(FIELD_CHANGES)])  # another where it is not seen
+            return draw_field_change(rng, later, kinds[-1])
+
+        change, strength = draw_sized(later, new, draw, beside=old)
+        new = simulate_field(later, (change,), old.rest_factors)
+        kind, changed = _kind_of(change), _changed(change)
+    for side, case in zip(SIDES, (old, new), strict=True):
+        write_field_observation(case, observation / side)
+    facts = {
+        "pair": plan.name,
+        "kind": kind,
+        "tier": "field",
+        "arm": f"{plan.machine.name}, {plan.machine.joints}",
+        "same_motion": plan.same_motion,
+        "drifting": False,
+        "size": strength,
+        "visible": strength >= LEAST_STRENGTH,
+        "changed": changed,
+    }
+    write_answer(facts, truth)
+
+
+def _kind_of(change: FieldEffect) -> str:
+    """A kind of change, by what changes."""
+    kinds = {"torque_gain_error": "gain", "encoder_offset": "zero", "payload": "payload"}
+    return kinds.get(change.effects[0], "friction")
+
+
+def _changed(change: FieldEffect) -> list[dict[str, Any]]:
+    """What changed, with the numbers that are known."""
+    known: dict[str, float] = {}
+    if change.number == "gain":
+        known = {"gain": change.size}
+    elif change.law is not None and "payload" not in change.effects:
+        known = known_differences(change.law)
+    return [{"effect": effect, "joint": change.place, "differences": known} for effect in change.effects]
