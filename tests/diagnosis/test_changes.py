@@ -285,7 +285,7 @@ def test_notes_say_which_columns_are_not_used() -> None:
 
 
 def test_the_old_model_predicts_its_own_robot() -> None:
-    old = comparison("same").old
+    old = comparison("same").diagnoses[0]
     time = np.arange(800) / 200
     motion = motion_at(time, 77)
     zero = np.zeros(motion.position.shape)

@@ -49,7 +49,7 @@ def report_page(diagnosis: Diagnosis, gallery: Gallery | None, command: str) -> 
         free_joints=measured.joints_without_finding(diagnosis),
         steps=content.steps_and_uses(diagnosis),
         gallery=gallery,
-        origin=content.origin_of(diagnosis, command),
+        origin=content.origin_of(diagnosis.recording, diagnosis.simulation, command, diagnosis),
         **more,
     )
 

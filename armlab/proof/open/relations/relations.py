@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from armlab.common.errors import DataError
-from armlab.diagnosis.changes.comparison import Comparison, compare_diagnosed
+from armlab.diagnosis.changes.comparison import Comparison, compare_with
 from armlab.diagnosis.changes.named import ONE_FACTOR
 from armlab.diagnosis.changes.numbers import Change
 from armlab.diagnosis.result import Claim, Diagnosis
@@ -64,7 +64,7 @@ class Desk:
     def compare(self, old: Recording, new: Recording) -> Comparison:
         """What changed from one to the other."""
         both = old, replace(new, arm=old.arm, simulation=old.simulation)
-        return compare_diagnosed(both, [self.diagnose(each) for each in both], None, (None, None))
+        return compare_with(both, lambda: [self.diagnose(each) for each in both], None, (None, None))
 
 
 Relation = Callable[[Recording, Desk], tuple[bool | None, str]]
