@@ -84,6 +84,7 @@ def test_a_name_is_right_where_it_is_in_a_class_of_three() -> None:
     assert count_names(true, [finding("inertial_parameter_error", 2, *members)]) == (True, 0)
     assert count_names(true, [finding("time_delay", None, ("time_delay", None), *members)]) == (False, 1)
     assert count_names([], [finding("payload", 3)]) == (False, 1)
+    assert count_names([], [finding("coulomb_friction", 3)], [["coulomb_friction", 3]]) == (False, 0)
 
 
 def outcome(kind: str, **told: object) -> PairOutcome:
@@ -107,8 +108,9 @@ def test_the_same_is_wrong_where_plain_least_squares_sees_a_change() -> None:
 
 
 def test_a_yardstick_that_sees_a_change_where_there_is_none_is_said() -> None:
-    found = counts(outcome("null", plain=9.0), outcome("null", tier="field"), outcome("null", plain=None))
-    assert (found[NO_YARDSTICK], found[f"{NO_YARDSTICK}, field"], found[FALSE]) == ((1, 2), (0, 1), (0, 3))
+    false = outcome("null", tier="field", wrong=1)
+    found = counts(outcome("null", plain=9.0), false, outcome("null", plain=None))
+    assert (found[NO_YARDSTICK], found[f"{NO_YARDSTICK}, field"], found[FALSE]) == ((1, 2), (0, 1), (1, 3))
 
 
 def test_intervals_are_judged_where_the_number_is_named_and_known() -> None:

@@ -1,7 +1,8 @@
 """Pairs that resemble real recordings: a robot of the field tier on two days, with nothing changed or one thing.
 
 What is known of the numbers of a change: a gain and a zero. Friction of the field is no level and no slope, and warms;
-a load is read through the gains of the drives.
+a load is read through the gains of the drives. Where a joint is so much warmer or colder that its friction differs by
+`WARMED`, friction may be named there.
 """
 
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from armlab.proof.blind.field.field_friction import JointFriction
 from armlab.proof.blind.field.field_hidden import FIELD_CHANGES, FieldEffect, draw_field_change
 from armlab.proof.blind.field.field_plan import FieldPlan, new_side
 from armlab.proof.blind.field.field_runs import simulate_field
@@ -16,6 +18,9 @@ from armlab.proof.blind.field.field_score import LEAST_STRENGTH
 from armlab.proof.blind.field.field_sizes import draw_sized
 from armlab.proof.blind.field.files import write_field_observation
 from armlab.proof.blind.pairs.pair_cases import SIDES, known_differences, write_answer
+
+WARMED = 0.05  # of the friction: less drowns in the rest of any joint
+LAWS = ("coulomb_friction", "viscous_friction")
 
 
 def write_field_pair(plan: FieldPlan, observation: Path, truth: Path) -> None:
@@ -46,8 +51,21 @@ def write_field_pair(plan: FieldPlan, observation: Path, truth: Path) -> None:
         "size": strength,
         "visible": strength >= LEAST_STRENGTH,
         "changed": changed,
+        "warmed": [[law, joint] for joint in _warmed(plan, later) for law in LAWS],
     }
     write_answer(facts, truth)
+
+
+def _warmed(old: FieldPlan, new: FieldPlan) -> list[int]:
+    """Joints, from 1, whose friction differs between the recordings because they are warmer or colder."""
+    heats = [np.array([_mean_heat(each, plan) for each in plan.friction]) for plan in (old, new)]
+    return [joint + 1 for joint in np.flatnonzero(np.abs(np.log(heats[1] / heats[0])) > WARMED).tolist()]
+
+
+def _mean_heat(friction: JointFriction, plan: FieldPlan) -> float:
+    """The mean factor of a joint's friction over all runs, which all begin as warm."""
+    times = np.concatenate([np.linspace(0, run.length_s, 50) for run in plan.runs])
+    return float(np.mean(friction.heat(times)))
 
 
 def _kind_of(change: FieldEffect) -> str:

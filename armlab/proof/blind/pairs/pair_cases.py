@@ -106,6 +106,7 @@ def write_pair(made: MadePair, observations: Path, truth: Path) -> None:
         "changed": [
             {"effect": each.effect, "joint": each.place, "differences": known_differences(each)} for each in made.change
         ],
+        "warmed": [],
     }
     write_answer(facts, truth)
 
@@ -118,7 +119,7 @@ def known_differences(change: HiddenEffect) -> dict[str, float]:
 
 def write_answer(facts: dict[str, Any], truth: Path) -> None:
     """Writes what is true of a pair (schema pair-truth/2): size, in detection limits or strengths; visible: whether it
-    counts; changed: effects with their places and the differences that are known.
+    counts; changed: effects with their places and the differences that are known; warmed: names that are not false.
     """
     truth.parent.mkdir(parents=True, exist_ok=True)
     truth.write_text(json.dumps({"schema": "pair-truth/2", **facts}, indent=1) + "\n", encoding="utf-8")
