@@ -32,7 +32,8 @@ _PATH = click.Path(path_type=Path)
     multiple=True,
     metavar="KIND COUNT",
     help="So many cases of a kind, such as `nulls 100`: torque and motion have cases, nulls; setup simulated, real, "
-    "nulls; real cases; changes changed, nulls; field cases, nulls, mistakes, pairs. May be given more than once.",
+    "nulls; real cases; changes changed, nulls, field_changed, field_nulls; field cases, nulls, mistakes. May be given "
+    "more than once.",
 )
 @click.option(
     "--folder",

@@ -30,10 +30,12 @@ from problem.regressor import observation_matrix
 COULOMB_WIDTH = 0.01  # of the top speed: where tanh has taken the place of the jump of a sign
 MIN_EXCITATION = 1e-6  # of the largest eigenvalue of the scaled normal matrix: directions below it stay zero
 WEIGHT_ROUNDS = 3
+COMPARED_HZ = 5.0  # low-pass of recordings that are compared: above the motions of arms, below most of their rest
 BLOCKS = 30  # of time, of a recording, whose scatter says how sure a parameter is
 BOOTSTRAP_DRAWS = 200
 TRIMMED_PERIODS = 2  # of the cut-off, at each end
 IDENTIFYING_SHARE = 0.6  # of each run, where no run validates
+SEEN_ERRORS = 8.0  # standard errors of a change: whoever says "same" beyond them is blind
 DEPENDENCE_TOLERANCE = 1e-7  # of a column's length: below it the rounded angles of a robot file make the difference
 PROBE_STATES = 200  # random states that show which columns depend on others
 LINK_ORDER = (
@@ -221,19 +223,49 @@ class PlainChanges:
         """The changes in standard errors, (columns,); 0 where the motion tells nothing of a column."""
         return np.divide(self.new - self.old, self.errors, out=np.zeros(len(self.old)), where=self.errors > 0)
 
+    @property
+    def largest(self) -> float:
+        """The largest change of a parameter, in standard errors."""
+        return float(np.abs(self.in_errors).max(initial=0.0))
 
-def compare_plain(arm: Arm, old: Sequence[Run], new: Sequence[Run], cutoff_hz: float) -> PlainChanges:
+    @property
+    def name(self) -> str:
+        """The parameter that changes most."""
+        return self.names[int(np.argmax(np.abs(self.in_errors)))]
+
+
+def compare_plain_folders(old: Path, new: Path, cutoff_hz: float = COMPARED_HZ) -> PlainChanges:
+    """What differs between two recording folders of one arm, of motion only, too.
+
+    Raises InputError for a folder that cannot be read, DataError where no run is long enough.
+    """
+    if is_motion_only(old):
+        before, after = (load_motion_recording(each) for each in (old, new))
+        runs = runs_of_motion(before), runs_of_motion(after)
+        return compare_plain(before.arm, *runs, cutoff_hz, before.joints)
+    first, second = (load_recording(each) for each in (old, new))
+    return compare_plain(first.arm, first.runs, second.runs, cutoff_hz)
+
+
+def compare_plain(
+    arm: Arm,
+    old: Sequence[Run],
+    new: Sequence[Run],
+    cutoff_hz: float = COMPARED_HZ,
+    joints: tuple[int, ...] | None = None,
+) -> PlainChanges:
     """What differs between the runs of two recordings of an arm.
 
-    Raises DataError where a recording has no run that is long enough.
+    joints: as in `fit_plain`. Raises DataError where a recording has no run that is long enough.
     """
+    joints = tuple(range(len(arm))) if joints is None else joints
     both = [
         [each for run in runs for each in [prepare_rows(run, cutoff_hz)] if len(each.torque)] for runs in (old, new)
     ]
     if not all(both):
         raise DataError(f"a recording has no run longer than {2 * TRIMMED_PERIODS} periods of {cutoff_hz:g} Hz")
     top_speed = np.max([np.abs(each.motion.velocity).max(axis=0) for rows in both for each in rows], axis=0)
-    layout = PlainLayout(arm, tuple(range(len(arm))), top_speed)
+    layout = PlainLayout(arm, joints, top_speed)
     fits = [_fit_with_error(layout, rows) for rows in both]
     return PlainChanges(layout.names, fits[0][0], fits[1][0], np.hypot(fits[0][1], fits[1][1]))
 

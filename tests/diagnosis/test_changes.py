@@ -31,7 +31,6 @@ from armlab.diagnosis.changes.pooled import pool_plainly, unite_candidates
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.predict.found_model import model_found
 from armlab.diagnosis.torque.rows.simulation import read_simulation
-from armlab.diagnosis.tuning import ComparisonTuning
 from armlab.effects.contract import Scene
 from armlab.effects.drive import TorqueGain, TorqueGainBySign
 from armlab.effects.friction import CoulombFriction, LevelsAndSlopes, Slopes, ViscousFriction
@@ -154,7 +153,7 @@ def test_what_plain_least_squares_sees_beyond_eight_standard_errors_is_never_the
     more += [recording(f"load-{mass}", 84, VISCOUS, mass) for mass in (0.25, 1.0, 3.0)]
     beyond = 0
     for new in (*nulls, *more):
-        plain = compare_plain(old.arm, old.runs, new.runs, ComparisonTuning().plain_cutoff_hz)
+        plain = compare_plain(old.arm, old.runs, new.runs)
         seen = look_plainly([old, new], simulation, Settings())
         assert seen is not None
         if new in nulls:
@@ -286,7 +285,7 @@ def test_notes_say_which_columns_are_not_used() -> None:
 
 
 def test_the_old_model_predicts_its_own_robot() -> None:
-    old = comparison("same").old
+    old = comparison("same").diagnoses[0]
     time = np.arange(800) / 200
     motion = motion_at(time, 77)
     zero = np.zeros(motion.position.shape)

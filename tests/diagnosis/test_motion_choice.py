@@ -15,7 +15,8 @@ from armlab.diagnosis.motion.choose import (
 from armlab.diagnosis.motion.estimate import ServoFit
 from armlab.diagnosis.motion.joint_replay import replay_joint
 from armlab.diagnosis.motion.servo import HIGHEST, KEYS, LOWEST, NEUTRAL, USUAL, Key, place
-from armlab.diagnosis.motion.windows import Windows, phase_of_steps, smallest_step
+from armlab.diagnosis.motion.windows import Windows, phase_of_steps, smallest_step, supply_factor
+from armlab.recordings.recording import MotionRun
 
 GAIN = GainOfNumber(share=0.5, enough=0.02, p_value=1e-6, rms_without=2e-3, rms_with=1e-3)
 
@@ -157,3 +158,12 @@ def still() -> Windows:
         encoder_step=0.0,
         encoder_phase=0.0,
     )
+
+
+def test_a_drive_that_commands_a_voltage_gives_less_torque_as_its_copper_warms() -> None:
+    time, zero = np.array([0.0, 1.0]), np.zeros((2, 1))
+    run = MotionRun("run.csv", "identify", time, zero, voltage=np.array([[12.0], [6.0]]))
+    warm = replace(run, temperature=np.array([[25.0], [77.0]]))
+    assert supply_factor(run, 0, time, None) is None
+    assert supply_factor(run, 0, time, 12.0) == pytest.approx([1.0, 0.5])
+    assert supply_factor(warm, 0, time, 12.0) == pytest.approx([1.0, 0.5 / (1 + 0.003854 * 52)], rel=1e-3)

@@ -6,8 +6,24 @@ import numpy as np
 import pytest
 
 from armlab.common.errors import InputError
+from armlab.common.settings import read_json
+from armlab.proof.blind.effects.channels import EncoderOffset, TorqueGain
+from armlab.proof.blind.field.field_plan import draw_field_plan
+from armlab.proof.blind.pairs.field_pairs import write_field_pair
+from armlab.proof.blind.pairs.pair_cases import known_differences
 from armlab.proof.blind.pairs.pair_plan import CHANGE_KINDS, PAIRS, DriftingNoise, PairPlan, draw_change, draw_pair
-from armlab.proof.blind.pairs.pair_score import PairOutcome, count_names, measures_of
+from armlab.proof.blind.pairs.pair_score import (
+    BLIND,
+    COVERED,
+    FALSE,
+    NO_YARDSTICK,
+    RIGHT,
+    PairOutcome,
+    count_names,
+    judge_intervals,
+    measures_of,
+    score_page,
+)
 from armlab.proof.tiers.changes import CHANGES, PairSet
 
 
@@ -68,17 +84,66 @@ def test_a_name_is_right_where_it_is_in_a_class_of_three() -> None:
     assert count_names(true, [finding("inertial_parameter_error", 2, *members)]) == (True, 0)
     assert count_names(true, [finding("time_delay", None, ("time_delay", None), *members)]) == (False, 1)
     assert count_names([], [finding("payload", 3)]) == (False, 1)
+    assert count_names([], [finding("coulomb_friction", 3)], [["coulomb_friction", 3]]) == (False, 0)
 
 
-def test_changes_below_three_detection_limits_do_not_count() -> None:
+def outcome(kind: str, **told: object) -> PairOutcome:
     facts = {"pair": "a", "tier": "clean", "arm": "scara", "same_motion": True, "drifting": False, "changed": []}
-    seen = PairOutcome(kind="gain", multiple=5.0, status="changed", named=[["x", 1]], right=True, wrong=0, **facts)
-    unseen = PairOutcome(kind="gain", multiple=2.0, status="same", named=[], right=False, wrong=0, **facts)
-    right = next(each for each in measures_of([seen, unseen]) if each.name == "right name or class of three")
-    assert (right.hits, right.number) == (1, 1)
+    said = {"size": 5.0, "visible": True, "status": "same", "named": [], "right": False, "wrong": 0, "covered": []}
+    return PairOutcome(kind=kind, **{**facts, **said, "plain": 2.0, **told})  # type: ignore[arg-type]
+
+
+def counts(*outcomes: PairOutcome) -> dict[str, tuple[int, int]]:
+    return {each.name: (each.hits, each.number) for each in measures_of(outcomes)}
+
+
+def test_changes_that_are_too_small_do_not_count() -> None:
+    seen, unseen = outcome("gain", right=True, named=[["x", 1]]), outcome("gain", visible=False)
+    assert counts(seen, unseen)[RIGHT] == (1, 1)
+
+
+def test_the_same_is_wrong_where_plain_least_squares_sees_a_change() -> None:
+    blind, good = outcome("gain", plain=9.0), outcome("gain", plain=9.0, status="changed")
+    assert counts(blind, good, outcome("gain"), outcome("gain", plain=None))[BLIND] == (1, 2)
+
+
+def test_a_yardstick_that_sees_a_change_where_there_is_none_is_said() -> None:
+    false = outcome("null", tier="field", wrong=1)
+    found = counts(outcome("null", plain=9.0), false, outcome("null", plain=None))
+    assert (found[NO_YARDSTICK], found[f"{NO_YARDSTICK}, field"], found[FALSE]) == ((1, 2), (0, 1), (1, 3))
+
+
+def test_intervals_are_judged_where_the_number_is_named_and_known() -> None:
+    true = [{"effect": "payload", "joint": 3, "differences": {"mass": 2.0}}]
+    row = {"effect": "payload", "joint": 3, "parameter": "mass", "difference_ci95": [1.8, 2.1], "changed": True}
+    others = [{**row, "difference_ci95": [2.1, 3.0]}, {**row, "changed": False}, {**row, "parameter": "centre"}]
+    assert list(judge_intervals(true, [row, *others, {**row, "joint": 2}])) == [True, False]
+    assert counts(outcome("payload", covered=[True, False]))[COVERED] == (1, 2)
+
+
+def test_what_is_known_of_a_change_are_differences() -> None:
+    assert known_differences(TorqueGain(0, 0.05, 0.5, "factor", {"direction": -1.0})) == {"gain": pytest.approx(-0.05)}
+    assert known_differences(EncoderOffset(0, 0.01, 0.08, "constant", {"direction": 1.0})) == {"offset": 0.01}
+
+
+def test_a_pair_of_the_field_says_what_changed(tmp_path: Path) -> None:
+    plans = (draw_field_plan(1700, index, "pair changed") for index in range(20))
+    plan = next(each for each in plans if each.machine.joints == 1)
+    write_field_pair(plan, tmp_path / "observation", tmp_path / "truth.json")
+    answer = read_json(tmp_path / "truth.json")
+    assert answer["kind"] in CHANGE_KINDS
+    assert len(answer["changed"]) == 1 + (answer["kind"] == "friction")
+    assert all((tmp_path / "observation" / side / "recording.yaml").is_file() for side in ("old", "new"))
+
+
+def test_the_page_says_what_is_wanted_and_lists_what_is_not_right() -> None:
+    outcomes = (outcome("null", status="changed", named=[["payload", 3]], wrong=1), outcome("gain", plain=9.0))
+    page = score_page(outcomes, tuple(measures_of(outcomes)))
+    assert "| nothing changed, something named | 100.0% (20.7% to 100.0%), 1 of 1 | at most 2% |" in page
+    assert page.count("| a | ") == 2
 
 
 def test_a_folder_of_other_pairs_is_refused(tmp_path: Path) -> None:
     (tmp_path / "settings.json").write_text("{}")
     with pytest.raises(InputError, match="holds another set"):
-        next(CHANGES.prove(PairSet(1, 0, 1700), tmp_path, tmp_path / "score", 1))
+        next(CHANGES.prove(PairSet(1, 0, 0, 0, 1700), tmp_path, tmp_path / "score", 1))

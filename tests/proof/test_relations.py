@@ -12,6 +12,13 @@ from armlab.proof.open.relations.variants import every_other_second, half, one_r
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
 
+MORE = (
+    "X against X, rows thinned",
+    "run against run",
+    "what is seen plainly is named",
+    "units, order, names, clock",
+)
+
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
@@ -23,7 +30,7 @@ def desk() -> Desk:
     return Desk()
 
 
-@pytest.mark.parametrize("name", [*QUICK, "X against X, rows thinned", "run against run", "units, order, names, clock"])
+@pytest.mark.parametrize("name", [*QUICK, *MORE])
 def test_relation_holds_on_a_small_recording(name: str, recording: Recording, desk: Desk) -> None:
     outcome = check_relation(name, recording, desk)
     assert outcome.holds, outcome.detail

@@ -23,9 +23,9 @@ SMALLEST: dict[str, tuple[SealedTier[Any, Any], Any]] = {  # seeds of one null o
     "torque": (TORQUE, SetSettings(1, 1017, "clean", "nulls", True)),
     "setup": (SETUP, SetupSet(0, 0, 1, 1013)),
     "motion": (MOTION, MotionSet(0, 1, 1025)),
-    "changes": (CHANGES, PairSet(1, 0, 1017)),
+    "changes": (CHANGES, PairSet(1, 0, 0, 0, 1017)),
     "real": (REAL, RealSet(("emps",), 0, 1001)),
-    "field": (FIELD_TIER, FieldSet(0, 1, 0, 0, 1000)),
+    "field": (FIELD_TIER, FieldSet(0, 1, 0, 1000)),
 }
 
 

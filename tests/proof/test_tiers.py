@@ -74,12 +74,12 @@ def test_a_tier_that_is_skipped_leaves_nothing_behind(monkeypatch: pytest.Monkey
 
 
 def test_a_size_replaces_that_kind_of_cases_in_each_tier_that_has_it(asked: list[Any], tmp_path: Path) -> None:
-    proof = choose_proof(False, 1200, {"cases": 4, "nulls": 0}, ())
+    proof = choose_proof(False, 1200, {"cases": 4, "nulls": 0, "field_nulls": 5, "field_changed": 6}, ())
     list(prove_tiers(proof, ("torque", "motion", "changes"), tmp_path, tmp_path / "results", 1))
     (torque, *_), (motion, *_), (changes, *_) = asked
     assert torque == {"mixed": SetSettings(4, 1200, development=True)}
     assert motion == MotionSet(4, 0, 1200)
-    assert changes == PairSet(0, 120, 1200)
+    assert changes == PairSet(0, 120, 5, 6, 1200)
     assert proof.commit is None
 
 

@@ -1,8 +1,8 @@
 """The comparison of recordings of one robot, step by step.
 
-`compare` is the whole flow: diagnose each recording (what there is), look for changes of rigid links and friction
-(`pool_plainly`), for finer ones beside a common model of all that was found where there are none (`pool_recordings`),
-name them (`name_changes`), and say what would have been seen (`list_table`).
+`compare` is the whole flow: look for changes of rigid links and friction (`pool_plainly`); where there are none,
+diagnose each recording and look for finer ones beside a common model of all that was found (`pool_recordings`); name
+them (`name_changes`), and say what would have been seen (`list_table`).
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -33,7 +33,9 @@ GEOMETRY_TOLERANCE = 1e-6  # rad (m): geometry that counts as that of the same r
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """diagnoses: of each recording alone. findings: what changed, the surest first. changes: every parameter compared.
+    """simulation: of all recordings. diagnoses: of each recording alone; none where links and friction show a change.
+
+    findings: what changed, the surest first. changes: every parameter compared.
 
     reason: of an inconclusive comparison. doubtful: what makes it so where the runs of one recording differ as much as
     the recordings. notes: sentences on what was not used. trends: of more than two recordings,
@@ -41,7 +43,9 @@ class Comparison:
     """
 
     status: ComparisonStatus
-    diagnoses: tuple[Diagnosis, ...]
+    recordings: tuple[Recording, ...]
+    simulation: Simulation
+    diagnoses: tuple[Diagnosis, ...] = ()
     findings: tuple[NamedChange, ...] = ()
     changes: tuple[Change, ...] = ()
     reason: str = ""
@@ -51,24 +55,14 @@ class Comparison:
     dates: tuple[date | None, ...] = ()
 
     @property
-    def old(self) -> Diagnosis:
-        """Of the first recording."""
-        return self.diagnoses[0]
-
-    @property
-    def new(self) -> Diagnosis:
-        """Of the last recording."""
-        return self.diagnoses[-1]
-
-    @property
     def arm(self) -> Arm:
         """Of all recordings: the simulation's, with the names of its joints."""
-        return self.new.simulation.arm
+        return self.simulation.arm
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the recordings."""
-        return tuple(each.recording.name for each in self.diagnoses)
+        return tuple(each.name for each in self.recordings)
 
     def __repr__(self) -> str:
         """The status, what changed, and how much was compared."""
@@ -110,34 +104,41 @@ def compare(
         known_dates = tuple(recording_date(each) for each in (old, new, *more))
     recordings = (old, *(replace(each, arm=old.arm, simulation=old.simulation) for each in (new, *more)))
     own = baseline or model_baseline(old)
-    diagnoses: list[Diagnosis] = []
-    for number in range(len(recordings)):
-        diagnoses.append(_diagnose_once(recordings, diagnoses, own, seed, _progress_of(number + 1, progress)))
-    return compare_diagnosed(recordings, diagnoses, baseline, known_dates, progress)
+
+    def diagnose_all() -> list[Diagnosis]:
+        diagnoses: list[Diagnosis] = []
+        for number in range(len(recordings)):
+            diagnoses.append(_diagnose_once(recordings, diagnoses, own, seed, _progress_of(number + 1, progress)))
+        return diagnoses
+
+    return compare_with(recordings, diagnose_all, baseline, known_dates, progress)
 
 
-def compare_diagnosed(
+def compare_with(
     recordings: Sequence[Recording],
-    diagnoses: Sequence[Diagnosis],
+    diagnose_all: Callable[[], Sequence[Diagnosis]],
     baseline: Baseline | None,
     dates: Sequence[date | None],
     progress: Callable[[str], None] = lambda message: None,
 ) -> Comparison:
-    """What changed between recordings of one robot of which each is diagnosed."""
+    """What changed between recordings of one robot. diagnose_all: diagnoses each, which takes most of the time."""
     simulation, settings = read_simulation(recordings[0], baseline or model_baseline(recordings[0])), Settings()
     progress("looking for changes of links and friction")
     seen = look_plainly(recordings, simulation, settings)
+    diagnoses: Sequence[Diagnosis] = ()
     if seen is None or not seen.sound.named:
+        diagnoses = diagnose_all()
+        none = Comparison("inconclusive", tuple(recordings), simulation, tuple(diagnoses))
         failed = next((each for each in diagnoses if each.model is None), None)
         if failed is not None:
-            return Comparison("inconclusive", tuple(diagnoses), reason=f"{failed.recording.name}: {failed.reason}")
+            return replace(none, reason=f"{failed.recording.name}: {failed.reason}")
         progress("looking for other changes")
         try:
             pooled = pool_recordings(recordings, unite_candidates(diagnoses), simulation, settings)
         except DataError as error:
-            return Comparison("inconclusive", tuple(diagnoses), reason=str(error))
+            return replace(none, reason=str(error))
         seen = _look(pooled, make_table)
-    return conclude(seen, diagnoses, tuple(_notes(recordings, baseline)), dates)
+    return conclude(seen, recordings, diagnoses, tuple(_notes(recordings, baseline)), dates)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +170,11 @@ def _look(pooled: Pooled, table_of: Callable[[Pooled], ChangeTable]) -> ChangeLo
 
 
 def conclude(
-    seen: ChangeLook, diagnoses: Sequence[Diagnosis], notes: tuple[str, ...], dates: Sequence[date | None]
+    seen: ChangeLook,
+    recordings: Sequence[Recording],
+    diagnoses: Sequence[Diagnosis],
+    notes: tuple[str, ...],
+    dates: Sequence[date | None],
 ) -> Comparison:
     """The changes with their names and numbers."""
     pooled, table, sound = seen.pooled, seen.table, seen.sound
@@ -177,6 +182,8 @@ def conclude(
     doubtful = () if sound.doubtful is None else name_changes(pooled, table, [sound.doubtful])
     return Comparison(
         "changed" if named else "inconclusive" if doubtful else "same",
+        tuple(recordings),
+        pooled.design.simulation,
         tuple(diagnoses),
         named,
         list_table(pooled, table, sound.named),

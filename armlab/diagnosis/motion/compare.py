@@ -34,6 +34,7 @@ from armlab.diagnosis.motion.windows import Windows, make_windows
 from armlab.recordings.motion import MotionRecording
 from problem.arm import Arm
 
+CONFIDENCE = 0.95  # of intervals
 MIN_RUNS = 3  # of each recording, for a scatter between runs
 POWER_QUANTILE = 1.2816  # of 90 % power, for the smallest change that would have been seen
 Pair = tuple[Windows, Windows]
@@ -335,8 +336,9 @@ def _change(
 ) -> ServoChange:
     """One number: its change where it was found, else none, with the interval of the fit in which all change.
 
-    judged: that model, its errors between runs, and their degrees of freedom. test: number of tests in all, and their
-    level. The interval is the wider one of those of windows and of runs.
+    judged: that model, its errors between runs, and their degrees of freedom. gains: of the numbers that were found.
+    test: number of tests in all, and their level. The interval is the wider one of those of windows and of runs. By it,
+    too, a change has to be sure among all that were found (Bonferroni).
     """
     looks, level = test
     (model, run_errors, run_freedoms), changed = judged, number in gains
@@ -344,14 +346,14 @@ def _change(
     windows_error = float(np.sqrt(source.covariance[count + position, count + position]))
     windows_freedom = float(max(pair[0].count + pair[1].count - count - len(model.changing), 1))
     candidates = ((windows_error, windows_freedom), (float(run_errors[position]), float(run_freedoms[position])))
-    error, freedom = max(candidates, key=lambda each: each[0] * float(student.ppf(0.975, each[1])))
-    half = float(student.ppf(0.975, freedom)) * error
+    error, freedom = max(candidates, key=lambda each: each[0] * float(student.ppf((1 + CONFIDENCE) / 2, each[1])))
+    half = float(student.ppf((1 + CONFIDENCE) / 2, freedom)) * error
     low, high = LOWEST[number], HIGHEST[number]
     old = float(np.clip(from_coordinates(source.old)[number], low, high))
     move = float(source.change[number])
     seen = (float(student.isf(level / looks, freedom)) + POWER_QUANTILE) * error
-    unchanged = min(2 * float(student.sf(abs(move) / max(error, 1e-300), freedom)) * looks, 1.0)
-    p_value = gains[number][0] if changed else unchanged
+    tail = 2 * float(student.sf(abs(move) / max(error, 1e-300), freedom))
+    p_value = gains[number][0] if changed else min(tail * looks, 1.0)
     if LOGARITHMIC[number]:
         ends = tuple(float(np.exp(np.clip(move + side * half, -50, 50))) for side in (0, -1, 1))
         interval = (old * (ends[1] - 1), old * (ends[2] - 1))
@@ -366,7 +368,7 @@ def _change(
         difference_interval=interval,
         ratio=ratio,
         p_value=p_value,
-        changed=changed and not interval[0] <= 0 <= interval[1],
+        changed=changed and tail * len(gains) < 1 - CONFIDENCE,
         detectable=detectable,
         before=gains[number][1] if changed else None,
         after=gains[number][2] if changed else None,

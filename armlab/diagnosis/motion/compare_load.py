@@ -18,7 +18,7 @@ from armlab.common.arrays import Array
 from armlab.common.errors import DataError
 from armlab.diagnosis.changes.comparison import Comparison, conclude, look_plainly
 from armlab.diagnosis.changes.named import NamedChange
-from armlab.diagnosis.result import Diagnosis, Rival
+from armlab.diagnosis.result import Rival
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.rows.simulation import read_simulation
 from armlab.effects.links import PAYLOAD_FACTS
@@ -56,9 +56,8 @@ def compare_load(old: MotionRecording, new: MotionRecording) -> Comparison | Non
     seen = look_plainly(recordings, simulation, settings)
     if seen is None:
         return None
-    diagnoses = [Diagnosis(each, simulation, "inconclusive", "") for each in recordings]
     notes = () if _kp(old) else ("kp is not stated: the load of the robot file in the old recording sets the scale.",)
-    found = conclude(seen, diagnoses, notes, ())
+    found = conclude(seen, recordings, (), notes, ())
     if log_odds > settings.tuning.comparison.least_evidence:
         return found
     if not any(each.effect == PAYLOAD_FACTS.id for each in found.findings):

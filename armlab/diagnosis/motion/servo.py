@@ -12,7 +12,8 @@ ki_speed = j, and kp = p kd + j.
 
 Inertia and load also hold a mass at the tool, `payload`, which is the same at all joints. f is the sign of the
 velocity, and anything between -1 and 1 at rest. c is the command, held between its samples. load is the torque of
-gravity and of the other joints. s is 1, or the supply voltage over its nominal value. Where nothing saturates, kd and
+gravity and of the other joints. s is 1, or the supply voltage over its nominal value, and less as the motor warms
+(`windows.supply_factor`). Where nothing saturates, kd and
 damping are one column; damping also holds back-EMF, with which the torque limit of a drive that is limited by its
 voltage falls with speed. So damping is fitted as a rule, with the kd of the simulation or none. kd is fitted in its
 place where a torque limit may act on it: of a drive of which nothing is stated, or where it explains more than damping.

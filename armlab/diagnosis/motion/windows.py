@@ -29,6 +29,10 @@ from problem.regressor import rigid_body_torque
 LOADS = ("inertia", "load", "slope", "unit_inertia", "unit_load", "unit_slope")
 SLOPE_STEP = 1e-3  # rad (m), of the central difference
 SAME_POSITION = 1e-6  # rad (m): rounding of one step of an encoder
+COPPER, RATED_TEMPERATURE = (
+    234.5,
+    25.0,
+)  # degrees Celsius: of copper below which it would have no resistance; of a data sheet
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,11 +277,22 @@ def held_command(run: MotionRun, joint: int, time: Array, rate_hz: float | None)
 
 
 def supply_factor(run: MotionRun, joint: int, time: Array, supply: float | None) -> Array | None:
-    """Supply voltage over its nominal value at given times; None where it is not known to matter."""
+    """Supply voltage over its nominal value at given times; None where it is not known to matter.
+
+    The current of a drive that commands a voltage falls as its copper warms, by 1 / (234.5 + T) (IEC 60034-1). Where a
+    temperature is recorded, the factor is one at RATED_TEMPERATURE.
+    """
     if supply is None or run.voltage is None:
         return None
-    column = run.voltage[:, min(joint, run.voltage.shape[1] - 1)]
-    return np.asarray(np.interp(time, run.time, column) / supply)
+    factor = _sensor(run.voltage, joint) / supply
+    if run.temperature is not None:
+        factor = factor * (COPPER + RATED_TEMPERATURE) / (COPPER + _sensor(run.temperature, joint))
+    return np.asarray(np.interp(time, run.time, factor))
+
+
+def _sensor(signal: Array, joint: int) -> Array:
+    """The channel of a joint, (samples,), or the last one."""
+    return np.asarray(signal[:, min(joint, signal.shape[1] - 1)])
 
 
 def _column(

@@ -1,10 +1,10 @@
-"""The field tier: recordings that resemble real ones, on which torque, reading and changes are judged together."""
+"""The field tier: recordings that resemble real ones, on which torque and reading are judged together."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from armlab.proof.blind.field.field_cases import SIDES, make_field_case
+from armlab.proof.blind.field.field_cases import make_field_case
 from armlab.proof.blind.field.field_plan import FieldKind, FieldPlan, draw_field_plan
 from armlab.proof.blind.field.field_score import score_field
 from armlab.proof.blind.sealed import OBSERVATION, TRUTH, TRUTH_FILE, VERDICTS, Score, SealedTier
@@ -12,7 +12,7 @@ from armlab.proof.blind.sealed import OBSERVATION, TRUTH, TRUTH_FILE, VERDICTS, 
 
 @dataclass(frozen=True)
 class FieldSet:
-    """How many cases of each kind: hidden effects, nulls, reading mistakes; pairs, changed and not in turn.
+    """How many cases of each kind: hidden effects, nulls, reading mistakes.
 
     Seeds 1000-1999 are for development.
     """
@@ -20,18 +20,14 @@ class FieldSet:
     cases: int
     nulls: int
     mistakes: int
-    pairs: int
     seed: int
 
     def plans(self) -> Iterator[FieldPlan]:
         """The plans of all cases, kind by kind."""
-        changed = self.pairs // 2
         counts: tuple[tuple[FieldKind, int], ...] = (
             ("null", self.nulls),
             ("hidden", self.cases),
             ("mistake", self.mistakes),
-            ("pair null", self.pairs - changed),
-            ("pair changed", changed),
         )
         for kind, count in counts:
             for index in range(count):
@@ -43,9 +39,7 @@ def _make(plan: FieldPlan, draft: Path) -> None:
 
 
 def _question(plan: FieldPlan, observation: Path) -> list[str]:
-    """A diagnosis, of the reading alone where only a mistake is judged; a comparison of a pair."""
-    if plan.kind.startswith("pair"):
-        return ["diagnose", "--compare", *(str(observation / side) for side in SIDES)]
+    """A diagnosis, of the reading alone where only a mistake is judged."""
     return ["diagnose", str(observation), *(["--only-setup"] if plan.kind == "mistake" else [])]
 
 

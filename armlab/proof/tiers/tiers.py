@@ -34,16 +34,16 @@ JUDGED: Mapping[TierName, Sizes] = {
     "setup": {"simulated": 300, "real": 200, "nulls": 300},
     "motion": {"cases": 300, "nulls": 300},
     "real": {"cases": 16},  # of each recording
-    "changes": {"nulls": 300, "changed": 120},
-    "field": {"cases": 100, "nulls": 100, "mistakes": 100, "pairs": 60},
+    "changes": {"nulls": 300, "changed": 120, "field_nulls": 200, "field_changed": 100},
+    "field": {"cases": 100, "nulls": 100, "mistakes": 100},
 }
 QUICK: Mapping[TierName, Sizes] = {
     "torque": {"cases": 24, "nulls": 0},
     "setup": {"simulated": 6, "real": 0, "nulls": 4},
     "motion": {"cases": 4, "nulls": 4},
     "real": {"cases": 1},
-    "changes": {"nulls": 2, "changed": 2},
-    "field": {"cases": 2, "nulls": 2, "mistakes": 2, "pairs": 2},
+    "changes": {"nulls": 2, "changed": 2, "field_nulls": 2, "field_changed": 2},
+    "field": {"cases": 2, "nulls": 2, "mistakes": 2},
 }
 QUICK_RECORDINGS = ("emps", "staubli-tx40")  # of the tier of real recordings
 

@@ -340,7 +340,7 @@ def comparison_page(comparison: Comparison, command: str) -> str:
         moved=_changes_table(comparison.arm, [each for each in changes if each.changed]),
         still=_changes_table(comparison.arm, [each for each in changes if not each.changed]),
         notes=comparison.notes,
-        origin=origin_of(comparison.new, command),
+        origin=origin_of(comparison.recordings[-1], comparison.simulation, command),
     )
 
 

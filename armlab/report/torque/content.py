@@ -11,9 +11,11 @@ from armlab.common.report.wording import count_of, format_number, join_words
 from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.diagnosis.torque.names.findings import FRICTION, STATED_SHARE, StatedCause
 from armlab.diagnosis.torque.predict.parts import LINKS
+from armlab.diagnosis.torque.rows.simulation import Simulation
 from armlab.effects.library import effect_named
 from armlab.identification.export import has_place_in_simulator
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER
+from armlab.recordings.recording import Recording
 from armlab.report.account.account import StatedFinding, account_of, finding_errors
 from armlab.report.account.summary import cause_name, cause_place, friction_sizes, open_share
 from armlab.report.torque.gallery import Gallery
@@ -352,9 +354,8 @@ def method_text(diagnosis: Diagnosis, held_out_blocks: bool) -> str:
     )
 
 
-def origin_of(diagnosis: Diagnosis, command: str) -> Origin:
-    """Where the data come from, and the command that repeats it."""
-    recording, simulation = diagnosis.recording, diagnosis.simulation
+def origin_of(recording: Recording, simulation: Simulation, command: str, diagnosis: Diagnosis | None = None) -> Origin:
+    """Where the data come from, and the command that repeats it. diagnosis: whose settings and signs stand there."""
     name = recording.simulation.name if recording.simulation else f"links of {recording.robot}"
     rows = [
         ["recording", recording.name],
@@ -362,8 +363,9 @@ def origin_of(diagnosis: Diagnosis, command: str) -> Origin:
         ["compared with", compared_in_words(simulation) + (f" ({name})" if simulation.kind == "nominal" else "")],
         *(["run", f"{run.name}: {run.role}, {run.samples} samples at {run.rate_hz:.5g} Hz"] for run in recording.runs),
         *(["repaired", f"{run.name}: {each.text}"] for run in recording.runs for each in run.repairs),
-        *([each.severity, each.text] for each in diagnosis.signs),
+        *([each.severity, each.text] for each in (() if diagnosis is None else diagnosis.signs)),
         ["armlab", version("armlab")],
     ]
-    settings = [[key.replace("_", " "), str(value)] for key, value in diagnosis.settings.items()]
+    numbers = {} if diagnosis is None else diagnosis.settings
+    settings = [[key.replace("_", " "), str(value)] for key, value in numbers.items()]
     return Origin(Table(["what", "of this page"], rows, (0, 1)), Table(["setting", "value"], settings, (0, 1)), command)

@@ -52,7 +52,7 @@ def report_page(diagnosis: Diagnosis, gallery: Gallery | None, command: str) -> 
         steps=next_steps(diagnosis, account_of(diagnosis)),
         uses=content.uses(diagnosis),
         gallery=gallery,
-        origin=content.origin_of(diagnosis, command),
+        origin=content.origin_of(diagnosis.recording, diagnosis.simulation, command, diagnosis),
         **more,
     )
 

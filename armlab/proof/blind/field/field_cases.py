@@ -1,4 +1,4 @@
-"""The folders of a field case and its answer: observation, or `old` and `new` below it, and truth."""
+"""The folders of a field case and its answer: observation and truth."""
 
 import json
 import shutil
@@ -6,14 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from armlab.proof.blind.field.field_hidden import (
-    FIELD_CHANGES,
-    FieldEffect,
-    draw_field_change,
-    draw_field_effect,
-    hidden_names,
-)
-from armlab.proof.blind.field.field_plan import FieldPlan, new_side
+from armlab.proof.blind.field.field_hidden import FieldEffect, draw_field_effect, hidden_names
+from armlab.proof.blind.field.field_plan import FieldPlan
 from armlab.proof.blind.field.field_runs import simulate_field
 from armlab.proof.blind.field.field_sizes import draw_sized
 from armlab.proof.blind.field.field_truth import FieldTruth, make_field_truth
@@ -23,18 +17,12 @@ from armlab.proof.blind.setup.mistakes import EFFECTS, draw_mistake, inject
 from armlab.proof.blind.setup.setup_oracle import is_seen
 from armlab.recordings.load import load_recording
 
-SIDES = ("old", "new")
 MISTAKE_DRAWS = 10
 
 
 def make_field_case(plan: FieldPlan, observation: Path, truth: Path) -> FieldTruth:
     """Writes the observation and the answer of a plan; returns the answer."""
-    if plan.kind.startswith("pair"):
-        answer = _make_pair(plan, observation)
-    elif plan.kind == "mistake":
-        answer = _make_mistake(plan, observation)
-    else:
-        answer = _make_single(plan, observation)
+    answer = _make_mistake(plan, observation) if plan.kind == "mistake" else _make_single(plan, observation)
     truth.write_text(json.dumps(answer.model_dump(mode="json", by_alias=True), indent=1) + "\n", encoding="utf-8")
     return answer
 
@@ -71,24 +59,6 @@ def _make_mistake(plan: FieldPlan, observation: Path) -> FieldTruth:
             break
     shutil.rmtree(right)
     return make_field_truth(case, mistakes=((made, seen),))
-
-
-def _make_pair(plan: FieldPlan, observation: Path) -> FieldTruth:
-    old = simulate_field(plan)
-    later = new_side(plan)
-    new = simulate_field(later, rest_factors=old.rest_factors)
-    write_field_observation(old, observation / SIDES[0])
-    if plan.kind == "pair null":
-        write_field_observation(new, observation / SIDES[1])
-        return make_field_truth(old)
-
-    def draw(rng: np.random.Generator, number: int) -> FieldEffect:
-        kind = FIELD_CHANGES[(plan.index + number // 3) % len(FIELD_CHANGES)]  # another one where it cannot be seen
-        return draw_field_change(rng, later, kind)
-
-    change, strength = draw_sized(later, new, draw, beside=old)
-    write_field_observation(simulate_field(later, (change,), old.rest_factors), observation / SIDES[1])
-    return make_field_truth(old, change=(change, strength))
 
 
 def _cycled(plan: FieldPlan, what: str, names: tuple[str, ...], attempt: int) -> str:

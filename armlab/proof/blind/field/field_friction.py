@@ -47,15 +47,18 @@ class JointFriction:
         kept = np.exp(-np.abs(steps) / self.way)
         return recursion(kept, np.sign(steps) * (1 - kept))
 
+    def heat(self, time: Array) -> Array:
+        """Factor of level and slope at times since the start of a run (steps,), s."""
+        return np.asarray(1 + self.cold * np.exp(-(np.maximum(time, 0) + self.running_s) / self.warming_s))
+
     def torque(self, track: Track, joint: int) -> Array:
         """Torque that the motor gives on top, (steps,), N m."""
         velocity, state = track.velocity[:, joint], self.state(track.position[:, joint])
-        heat = 1 + self.cold * np.exp(-(np.maximum(track.time, 0) + self.running_s) / self.warming_s)
         level = self.coulomb + self.fall * np.exp(-((velocity / self.fall_speed) ** 2))
         level = level + self.load_share * np.abs(track.load[:, joint])
         level = level * (1 + self.asymmetry * np.tanh(state / DIRECTION_WIDTH))
         grown = self.power * np.sign(velocity) * np.abs(velocity) ** self.exponent
-        return np.asarray((state * level + self.viscous * velocity) * heat + grown)
+        return np.asarray((state * level + self.viscous * velocity) * self.heat(track.time) + grown)
 
 
 def draw_friction(rng: np.random.Generator, rating: float, top_speed: float, noticeable_way: bool) -> JointFriction:

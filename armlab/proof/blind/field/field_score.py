@@ -17,23 +17,22 @@ from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.settings import read_json, validate
 from armlab.proof.blind.field.field_truth import FieldTruth, PlacedEffect, TrueMistake
-from armlab.proof.blind.pairs.pair_score import count_names
 from armlab.proof.blind.score.cases import UNKNOWN_NAME, VALID_STATUSES, is_indistinguishable, read_complaint
 from armlab.proof.blind.score.share import Share
 
 MAX_CLASS = 3  # names
-LEAST_STRENGTH = 0.7  # of a hidden effect or a change that counts
+VERDICT_FILE = "verdict.json"
+LEAST_STRENGTH = 0.7  # of a hidden effect that counts
 DOUBT = re.compile(r"(?<!othing is )read wrongly|may be read|not be excluded|cannot (?:be excluded|exclude)")
 SAME_READING = {"torque_sign": "joint_direction", "joint_direction": "torque_sign"}
-VERDICT_FILES = ("verdict.json", "comparison.json")
 
 
 @dataclass(frozen=True)
 class FieldOutcome:
     """One case: what is true of it, and what was said.
 
-    true: what is hidden, wrong or changed, as effect@joint. visible: whether it counts. named: names of physics, or of
-    changes; false: those that are not true. setup: names of reading mistakes; false_setup: those that are not there.
+    true: what is hidden or wrong, as effect@joint. visible: whether it counts. named: names of physics; false: those
+    that are not true. setup: names of reading mistakes; false_setup: those that are not there.
     doubt: whether the summary says that the recording may be read wrongly. right, in_class: whether what is true is
     named, or is in the class of a finding.
     """
@@ -76,27 +75,20 @@ def judge_field_case(truth_file: Path, folder: Path) -> FieldOutcome:
     truth = validate(FieldTruth, read_json(truth_file), str(truth_file))
     complaint = read_complaint(folder)
     verdict: dict[str, Any] = {"status": complaint or "no verdict", "findings": []}
-    found = next((folder / name for name in VERDICT_FILES if (folder / name).is_file()), None)
-    if found is not None and not complaint:
-        verdict = read_json(found)
+    if (folder / VERDICT_FILE).is_file() and not complaint:
+        verdict = read_json(folder / VERDICT_FILE)
     return judge_verdict(truth, verdict)
 
 
 def judge_verdict(truth: FieldTruth, verdict: dict[str, Any]) -> FieldOutcome:
-    """See the module. verdict: of a diagnosis, or of a comparison for a pair."""
+    """See the module. verdict: of a diagnosis."""
     findings = verdict["findings"]
     setup = [each for each in findings if each.get("kind") == "setup"]
     physics = [each for each in findings if each.get("kind") != "setup"]
-    is_pair = truth.kind.startswith("pair")
-    sought: Sequence[PlacedEffect] = truth.change or truth.hidden or truth.mistakes
-    if is_pair:
-        right, _ = count_names([{"effect": each.effect, "joint": each.joint} for each in truth.change], physics)
-        false = [each for each in physics if not count_names(_plain(truth.change), [each])[0]]
-        in_class = right
-    else:
-        about = setup if truth.mistakes else physics
-        right, in_class = (_are_named(truth, about, names) for names in (1, MAX_CLASS))
-        false = [] if truth.mistakes else [each for each in physics if not is_true_name(truth, each)]
+    sought: Sequence[PlacedEffect] = truth.hidden or truth.mistakes
+    about = setup if truth.mistakes else physics
+    right, in_class = (_are_named(truth, about, names) for names in (1, MAX_CLASS))
+    false = [] if truth.mistakes else [each for each in physics if not is_true_name(truth, each)]
     return FieldOutcome(
         case=truth.case,
         kind=truth.kind,
@@ -141,23 +133,16 @@ def measure_field(outcomes: Sequence[FieldOutcome]) -> Iterator[Share]:
     if single:
         missing = sum(each.status not in VALID_STATUSES for each in single)
         yield Share("nulls and hidden effects: no verdict", missing, len(single))
-    for kind, name in (("hidden", "hidden effects"), ("mistake", "mistakes"), ("pair changed", "changed pairs")):
+    for kind, name in (("hidden", "hidden effects"), ("mistake", "mistakes")):
         own = [each for each in kinds.get(kind, []) if each.visible]
         if own:
             yield Share(f"{name}: named", sum(each.right for each in own), len(own))
             yield Share(f"{name}: named, or in a class of three", sum(each.in_class for each in own), len(own))
-    for kind in ("pair null", "pair changed"):
-        own = kinds.get(kind, [])
-        if own:
-            wrong = sum(bool(each.false) for each in own)
-            yield Share(f"{kind}: a false change", wrong, len(own))
-            yield Share(f"{kind}: inconclusive", sum(each.status == "inconclusive" for each in own), len(own))
 
 
 def _is_visible(truth: FieldTruth) -> bool:
-    sized = (*truth.hidden, *truth.change)
-    if sized:
-        return all(each.strength >= LEAST_STRENGTH for each in sized)
+    if truth.hidden:
+        return all(each.strength >= LEAST_STRENGTH for each in truth.hidden)
     return all(each.seen for each in truth.mistakes)
 
 
@@ -186,10 +171,6 @@ def _is_mistake(true: TrueMistake, finding: dict[str, Any], names: int) -> bool:
 
 def _is_true_mistake(truth: FieldTruth, finding: dict[str, Any]) -> bool:
     return any(_is_mistake(true, finding, MAX_CLASS) for true in truth.mistakes)
-
-
-def _plain(effects: Sequence[PlacedEffect]) -> list[dict[str, Any]]:
-    return [{"effect": each.effect, "joint": each.joint} for each in effects]
 
 
 def _label(effect: str, joint: int | None) -> str:

@@ -1,4 +1,4 @@
-"""The answer to a field case (schema field-truth/1): what stands in the background, and what is hidden or changed."""
+"""The answer to a field case (schema field-truth/1): what stands in the background, and what is hidden."""
 
 from typing import Literal
 
@@ -22,7 +22,7 @@ class PlacedEffect(Settings):
 
 
 class SizedEffect(PlacedEffect):
-    """A hidden effect, or a change. size: in the unit of its main number. strength: see `field/sizing.py`."""
+    """A hidden effect. size: in the unit of its main number. strength: see `field/sizing.py`."""
 
     size: float
     strength: float
@@ -48,7 +48,7 @@ class FieldTruth(Settings):
     """The answer to a case.
 
     length_s: of all runs of one recording. links: whether the robot file has some; link_errors: relative, of each.
-    background: what every arm has. hidden, mistakes, change: what a diagnosis or a comparison should say.
+    background: what every arm has. hidden, mistakes: what a diagnosis should say.
     """
 
     schema_: Literal["field-truth/1"] = Field(alias="schema")
@@ -64,16 +64,14 @@ class FieldTruth(Settings):
     rest: tuple[RestShare, ...]
     hidden: tuple[SizedEffect, ...] = ()
     mistakes: tuple[TrueMistake, ...] = ()
-    change: tuple[SizedEffect, ...] = ()
 
 
 def make_field_truth(
     case: FieldCase,
     hidden: tuple[FieldEffect, float] | None = None,
     mistakes: tuple[tuple[Injected, bool], ...] = (),
-    change: tuple[FieldEffect, float] | None = None,
 ) -> FieldTruth:
-    """The answer to a simulated case. hidden, change: with their strength. mistakes: with whether each can be seen."""
+    """The answer to a simulated case. hidden: with its strength. mistakes: with whether each can be seen."""
     plan = case.plan
     return FieldTruth(
         schema="field-truth/1",
@@ -99,7 +97,6 @@ def make_field_truth(
             )
             for each, seen in mistakes
         ),
-        change=_sized(change),
     )
 
 

@@ -93,22 +93,33 @@ def write_pair(made: MadePair, observations: Path, truth: Path) -> None:
     """Writes the recording folders `old` and `new`, and the answer."""
     for side, case in zip(SIDES, made.cases, strict=True):
         write_observation(case, observations / side)
-    truth.parent.mkdir(parents=True, exist_ok=True)
-    truth.write_text(json.dumps(answer(made), indent=1) + "\n", encoding="utf-8")
-
-
-def answer(made: MadePair) -> dict[str, Any]:
-    """What is true of a pair."""
     plan = made.plan
-    return {
-        "schema": "pair-truth/1",
+    facts = {
         "pair": plan.name,
         "kind": plan.kind,
         "tier": plan.old.tier,
         "arm": plan.old.machine.name,
         "same_motion": plan.old.same_motion,
         "drifting": plan.drifting,
-        "noise": plan.old.noise.kind,
-        "multiple": made.multiple,
-        "changed": [{"effect": each.effect, "joint": each.place, "size": each.size} for each in made.change],
+        "size": made.multiple,
+        "visible": made.multiple >= PAIRS.least_multiple,
+        "changed": [
+            {"effect": each.effect, "joint": each.place, "differences": known_differences(each)} for each in made.change
+        ],
+        "warmed": [],
     }
+    write_answer(facts, truth)
+
+
+def known_differences(change: HiddenEffect) -> dict[str, float]:
+    """New less old of each parameter that means the same in a fitted law; a gain is one where nothing changed."""
+    own = {name: value for name, value in change.parameters().items() if name in change.comparable}
+    return {name: value - (name == "gain") for name, value in own.items() if not isinstance(value, list)}
+
+
+def write_answer(facts: dict[str, Any], truth: Path) -> None:
+    """Writes what is true of a pair (schema pair-truth/2): size, in detection limits or strengths; visible: whether it
+    counts; changed: effects with their places and the differences that are known; warmed: names that are not false.
+    """
+    truth.parent.mkdir(parents=True, exist_ok=True)
+    truth.write_text(json.dumps({"schema": "pair-truth/2", **facts}, indent=1) + "\n", encoding="utf-8")

@@ -13,10 +13,17 @@ from armlab.common.errors import InputError, describe_failure
 from armlab.common.files import write_texts
 from armlab.diagnosis.formats import read_verdict_file
 from armlab.proof.open.real_folders.consistency import contradictions
-from armlab.proof.open.real_folders.errors import FolderErrors, measure_errors
+from armlab.proof.open.real_folders.errors import FolderErrors, measure_change, measure_errors
 from armlab.proof.open.real_folders.facts import FactsFile, PairFacts, SingleFacts, read_facts
 from armlab.proof.open.real_folders.facts_score import FolderScore, score_missing, score_pair, score_single
-from armlab.proof.open.real_folders.recording_folders import RecordingFolder, check_facts, choose_folders, find_folders
+from armlab.proof.open.real_folders.recording_folders import (
+    NEW,
+    OLD,
+    RecordingFolder,
+    check_facts,
+    choose_folders,
+    find_folders,
+)
 from armlab.proof.open.real_folders.runs import FolderOutcome, FolderRun, plan_runs, run_missing
 from armlab.proof.open.real_folders.stated_names import ToldVerdict, read_told
 from armlab.proof.open.real_folders.table import FolderRow, table_texts, total_lines
@@ -77,7 +84,7 @@ def prove_folders(settings: FolderProof, only: Sequence[str] = ()) -> Iterator[s
 
 def _measure(run: FolderRun, known: SingleFacts | PairFacts | None) -> FolderErrors:
     if run.folder.pair:
-        return FolderErrors()
+        return measure_change(run.folder.path / OLD, run.folder.path / NEW)
     if isinstance(known, SingleFacts) and known.percent == "none":
         return FolderErrors(notes=("plain least squares is no yardstick here",))
     try:

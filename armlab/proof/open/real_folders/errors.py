@@ -19,6 +19,7 @@ from armlab.recordings.motion import is_motion_only
 from armlab.recordings.plain_least_squares import (
     PlainFit,
     PlainRows,
+    compare_plain_folders,
     fit_plain_recording,
     prepare_rows,
     split_runs,
@@ -54,11 +55,25 @@ class JointErrors:
 
 @dataclass(frozen=True)
 class FolderErrors:
-    """Errors by joint. notes: why a model has none, in one line each."""
+    """Errors by joint. notes: why a model has none, in one line each.
+
+    plain_change: of a pair, the largest change that plain least squares sees, standard errors.
+    """
 
     cutoff_hz: float | None = None
     joints: tuple[JointErrors, ...] = ()
     notes: tuple[str, ...] = ()
+    plain_change: float | None = None
+
+
+def measure_change(old: Path, new: Path) -> FolderErrors:
+    """What plain least squares sees between the recordings of a pair; what cannot be computed is a note."""
+    try:
+        change = compare_plain_folders(old, new)
+    except (InputError, ValueError) as error:
+        return FolderErrors(notes=(f"plain least squares: {error}",))
+    said = f"plain least squares: {change.name} changes by {change.largest:.1f} standard errors"
+    return FolderErrors(notes=(said,), plain_change=change.largest)
 
 
 def measure_errors(folder: Path, verdict_folder: Path, cutoff_hz: float | None) -> FolderErrors:

@@ -11,6 +11,7 @@ from armlab.proof.open.real_folders.facts_score import FolderScore
 from armlab.proof.open.real_folders.recording_folders import RecordingFolder
 from armlab.proof.open.real_folders.runs import FolderOutcome
 from armlab.proof.open.real_folders.stated_names import FACT_RANKS, ToldVerdict
+from armlab.recordings.plain_least_squares import SEEN_ERRORS
 
 PAGE_NAME, TABLE_NAME, JOINTS_NAME = "folders.md", "folders.csv", "folders_joints.csv"
 FOLDER_HEADINGS = (
@@ -134,7 +135,8 @@ def total_lines(rows: Sequence[FolderRow]) -> list[str]:
     lines = [f"no verdict: {', '.join(lost) or 'none'}"]
     singles = [each.score for each in rows if each.score is not None and not each.folder.pair]
     pairs = [each.score for each in rows if each.score is not None and each.folder.pair]
-    return [*lines, *([_singles_line(singles)] if singles else []), *([_pairs_line(pairs)] if pairs else [])]
+    lines += [_singles_line(singles)] if singles else []
+    return [*lines, *([_pairs_line(pairs), _plain_line(rows)] if pairs else [])]
 
 
 def _singles_line(scores: Sequence[FolderScore]) -> str:
@@ -154,6 +156,19 @@ def _pairs_line(scores: Sequence[FolderScore]) -> str:
     return (
         f"pairs: {_ranks_text(scores)}; size right {sum(bool(fact.size_right) for fact in facts)} of {len(facts)}; "
         f"WRONG {_sum(len(each.wrong) for each in scores)}, extra {_sum(len(each.extra) for each in scores)}"
+    )
+
+
+def _plain_line(rows: Sequence[FolderRow]) -> str:
+    """Whether a comparison says "same" where plain least squares sees a change, and whether that is a yardstick."""
+    measured = [each for each in rows if each.errors.plain_change is not None]
+    beyond = [each for each in measured if (each.errors.plain_change or 0.0) > SEEN_ERRORS]
+    same = sum(each.verdict is not None and each.verdict.status == "same" for each in beyond)
+    nulls = [each for each in measured if each.score is not None and not each.score.facts]
+    return (
+        f"pairs: plain least squares sees a change beyond {SEEN_ERRORS:g} standard errors in {len(beyond)} of "
+        f'{len(measured)}; "same" is said of {same} of these; of {len(nulls)} with nothing changed it sees one in '
+        f"{sum(each in nulls for each in beyond)}"
     )
 
 

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from armlab.common.errors import DataError
-from armlab.diagnosis.changes.comparison import Comparison, compare_diagnosed
+from armlab.diagnosis.changes.comparison import Comparison, compare_with
 from armlab.diagnosis.changes.named import ONE_FACTOR
 from armlab.diagnosis.changes.numbers import Change
 from armlab.diagnosis.result import Claim, Diagnosis
@@ -29,6 +29,7 @@ from armlab.proof.open.relations.variants import (
     with_viscous_friction,
 )
 from armlab.proof.open.stored import recording_digest
+from armlab.recordings.plain_least_squares import SEEN_ERRORS, compare_plain
 from armlab.recordings.recording import Recording
 
 STRETCH_S = (1.0, 2.0, 3.0)  # odd against even: the shortest stretches that can be filtered
@@ -63,7 +64,7 @@ class Desk:
     def compare(self, old: Recording, new: Recording) -> Comparison:
         """What changed from one to the other."""
         both = old, replace(new, arm=old.arm, simulation=old.simulation)
-        return compare_diagnosed(both, [self.diagnose(each) for each in both], None, (None, None))
+        return compare_with(both, lambda: [self.diagnose(each) for each in both], None, (None, None))
 
 
 Relation = Callable[[Recording, Desk], tuple[bool | None, str]]
@@ -216,6 +217,28 @@ def added_law_is_found(recording: Recording, desk: Desk) -> tuple[bool | None, s
     return bool(friction & set(classes)) and not rest.findings, f"viscous friction at joint {joint + 1}: {named} named"
 
 
+def what_is_seen_plainly_is_named(recording: Recording, desk: Desk) -> tuple[bool | None, str]:
+    """Where plain least squares sees a change, the comparison does not say "same"; where nothing changed, it sees none.
+
+    Pairs: an added law, the seconds in turn, and both halves.
+    """
+    even, odd = (every_other_second(recording, first, STRETCH_S[-1]) for first in (0, 1))
+    nulls = {"odd against even": (even, odd), "halves": (half(recording, 0), half(recording, 1))}
+    changed = {"added law": (recording, with_viscous_friction(recording, loaded_joint(recording)))}
+    said, broken = list[str](), list[str]()
+    for name, (old, new) in {**changed, **nulls}.items():
+        try:
+            size = compare_plain(old.arm, old.runs, new.runs).largest
+        except DataError:
+            continue
+        said.append(f"{name}: {size:.1f} standard errors")
+        if size > SEEN_ERRORS and name in nulls:
+            broken.append(f"{said[-1]}, no yardstick")
+        elif size > SEEN_ERRORS and desk.compare(old, new).status == "same":
+            broken.append(f'{said[-1]}, "same"')
+    return not broken if said else None, "; ".join(broken or said) or "no run is long enough"
+
+
 def _taken_off(recording: Recording, added: Recording) -> Recording:
     """The added torque taken off again, equal to the recording but for rounding."""
     runs = []
@@ -258,6 +281,7 @@ RELATIONS: dict[str, Relation] = {
     "units, order, names, clock": same_however_written,
     "fewer rows replace no name": fewer_rows_replace_no_name,
     "added law found, and gone again": added_law_is_found,
+    "what is seen plainly is named": what_is_seen_plainly_is_named,
     "no finding raises the held-out error": findings_help,
     "predicts as well as identification": predicts_as_well_as_identification,
 }
