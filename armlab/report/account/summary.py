@@ -95,10 +95,12 @@ class _Writer:
         amount = "More than 99" if is_alone else "Less than 1" if share < 1 else str(share)
         sentence = f"{amount} % of the error comes from {self.cause_in_words(first)}"
         for each in others:
-            longer = f"{sentence}, {100 * each.share:.0f} % from {self.cause_in_words(each)}"
-            if len(longer.split()) > MAX_FIRST_WORDS:
+            names = (self.cause_in_words(each), cause_name(each, self.account.findings_of(each)))
+            tried = [f"{sentence}, {100 * each.share:.0f} % from {name}" for name in names]
+            fitting = [one for one in tried if len(one.split()) <= MAX_FIRST_WORDS]
+            if not fitting:
                 break
-            sentence = longer
+            sentence = fitting[0]
         unnamed = open_share(self.account)
         longer = f"{sentence}; {100 * unnamed:.0f} % is unnamed"
         if unnamed > 1 - STATED_SHARE and len(longer.split()) <= MAX_FIRST_WORDS:
@@ -145,10 +147,11 @@ class _Writer:
         fit, before = self._largest_fall()
         arm, unit = self.diagnosis.simulation.arm, joint_unit(self.diagnosis.simulation.arm, fit.joint - 1)
         left = next((each for each in self.account.left if each.joint == fit.joint), None)
-        share = "" if left is None else f", {100 * left.share_of_torque:.0f} % of its torque"
-        falls = "falls" if fit.after < before else "does not fall:"
+        of = "torque" if unit == "N m" else "force"
+        share = "" if left is None else f", {100 * left.share_of_torque:.0f} % of its {of}"
+        falls = "falls most" if fit.after < before else "does not fall"
         return (
-            f"On held-out data the error of {joint_in_words(arm, fit.joint)} {falls} from {format_fixed(before)} "
+            f"On held-out data the error {falls} at {joint_in_words(arm, fit.joint)}: from {format_fixed(before)} "
             f"({compared_in_words(self.diagnosis.simulation)}) to {format_fixed(fit.after)} {unit}{share}."
         )
 

@@ -19,7 +19,7 @@ from armlab.report.motion.motion_words import (
 )
 from armlab.report.motion.stated_numbers import stated_numbers
 from armlab.report.words import format_chance
-from problem.joint_words import joint_at_start, joint_in_table
+from problem.joint_words import joint_at_start, joint_in_table, joints_in_words
 
 USE = (
     "Take the simulation with these numbers: `simulation.xml` as MJCF for MuJoCo; `robot.urdf` and `controllers.yaml` "
@@ -60,27 +60,30 @@ def motion_page(diagnosis: MotionDiagnosis, command: str) -> str:
 
 
 def joint_table(diagnosis: MotionDiagnosis) -> Table:
-    """What is wrong with the servo of each joint, with its interval, and the replay error before and after."""
+    """What is wrong with the servo of each joint, with its interval, how sure, and the replay error before → after."""
     rows, arm = [], diagnosis.simulation.arm
     for each in diagnosis.errors:
         stated = [one for one in stated_numbers(diagnosis) if not one.minor]
         own = [one for one in stated if one.finding.joint == each.joint]
         words = "; ".join(finding_with_numbers(one.finding) for one in own)
         sure = "; ".join(format_chance(one.statement.probability) for one in own)
-        before = "" if each.replay_before is None else f"{1e3 * each.replay_before:.3g} mrad"
-        rows.append((joint_in_table(arm, each.joint), words, sure, before, f"{1e3 * each.replay_after:.3g} mrad"))
-    headings = ("joint", "what is wrong, 95 % interval", "how sure", "replay error before", "after")
+        before = "" if each.replay_before is None else f"{1e3 * each.replay_before:.3g} → "
+        errors = f"{before}{1e3 * each.replay_after:.3g} mrad"
+        rows.append((joint_in_table(arm, each.joint), words, sure, errors))
+    headings = ("joint", "what is wrong, 95 % interval", "how sure", "replay error")
     return Table(headings, rows, (1, 2), stacked=True)
 
 
 def _next_recordings(diagnosis: MotionDiagnosis) -> list[str]:
-    """Recordings that separate the findings from their rivals."""
-    steps = {
-        each.finding.parameter.experiment or effect_named(each.finding.effect).experiment: None
-        for each in sorted(stated_numbers(diagnosis), key=lambda each: -each.share)
-        if each.finding.rivals and not each.minor
-    }
-    return [f"{step[0].upper()}{step[1:]}." for step in steps if step][:MAX_STEPS]
+    """Recordings that separate the findings from their rivals, each with the joints of these findings."""
+    steps: dict[str, list[int]] = {}
+    for each in sorted(stated_numbers(diagnosis), key=lambda each: -each.share):
+        step = each.finding.parameter.experiment or effect_named(each.finding.effect).experiment
+        if each.finding.rivals and not each.minor and step:
+            steps.setdefault(step, []).append(each.finding.joint)
+    arm = diagnosis.simulation.arm
+    places = {step: joints_in_words(arm, sorted(set(joints))) for step, joints in steps.items()}
+    return [f"{step[0].upper()}{step[1:]} ({place})." for step, place in places.items()][:MAX_STEPS]
 
 
 def _error_table(diagnosis: MotionDiagnosis) -> Table:

@@ -110,9 +110,9 @@ def _replay_sentence(diagnosis: MotionDiagnosis) -> str:
         return f"Its largest replay error is {1e3 * worst.replay_after:.3g} mrad ({joint_in_words(arm, worst.joint)})."
     best = max(diagnosis.errors, key=lambda each: (each.replay_before or 0.0) / max(each.replay_after, 1e-300))
     before, after = 1e3 * (best.replay_before or 0.0), 1e3 * best.replay_after
-    falls = "falls" if after < before else "does not fall:"
+    falls = "falls most" if after < before else "does not fall"
     return (
-        f"On held-out runs the replay error of {joint_in_words(arm, best.joint)} {falls} from {before:.3g} mrad to "
+        f"On held-out runs the replay error {falls} at {joint_in_words(arm, best.joint)}: from {before:.3g} mrad to "
         f"{after:.3g} mrad, {_share_of_motion(best)} of its motion."
     )
 

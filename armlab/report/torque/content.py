@@ -125,7 +125,7 @@ def _cause_size(diagnosis: Diagnosis, cause: StatedCause) -> str:
         return "".join(texts)
     texts = [f"friction {each}" for each in texts]
     places = {each.claim.joint for each in own}
-    for each in own:
+    for each in sorted(own, key=lambda each: each.claim.joint or 0):
         if numbers := claim_figures(each.claim, diagnosis.simulation):
             joint = each.claim.joint
             texts.append(f"{joint_in_words(arm, joint)}: {numbers}" if joint and len(places) > 1 else numbers)
@@ -326,7 +326,7 @@ def _motion_may_tell(claim: Claim) -> bool:
 
 def _export_text(diagnosis: Diagnosis) -> str:
     if diagnosis.simulation.inertial is None or diagnosis.is_plain:
-        return "It has base parameters, which simulators do not take: they need nominal `links` to start from."
+        return "For a simulator give the robot file nominal `links` first: it takes no base parameters alone."
     missing = dict.fromkeys(claim.effect for claim in diagnosis.claims if not _has_place_in_simulator(claim))
     lost = f" That has no place for {join_words([effect_in_words(each) for each in missing])}." if missing else ""
     return f"Where a simulator needs it: `armlab model export model.yaml model.xml` writes MJCF.{lost}"
