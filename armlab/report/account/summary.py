@@ -53,8 +53,8 @@ def sentences_of(diagnosis: Diagnosis) -> tuple[str, ...]:
         model = model_in_words(diagnosis.simulation)
         return (f"Nothing is missing: {model} explains the recording down to its noise (at most {worst:.3g} N m).",)
     if not account.findings:
-        small = count_of(len(account.minor), "small difference")
-        first = f"Nothing of practical size is missing: {small} change no held-out error by 5 %."
+        small, change = count_of(len(account.minor), "small difference"), "change" if account.minor[1:] else "changes"
+        first = f"Nothing of practical size is missing: {small} {change} no held-out error by 5 %."
         return first, _rest(account, diagnosis)
     return _Writer(diagnosis, account).sentences()
 
