@@ -32,7 +32,7 @@ class ChangeGroup:
     their coefficients. parts: laws that change together, each with its own coefficients. common: numbers of the same
     columns in common; empty where links hold them. least: a smaller change is how logs are made, see
     `Parameter.sampled`. whole_law: nonlinear parameters change with the coefficients of the law; their columns are
-    derivatives. familiar: whether the common model has it.
+    derivatives. familiar: whether the common model has it, as it has all links.
     """
 
     block: Block
@@ -259,7 +259,7 @@ def _finish_table(parts: "_CommonColumns", offers: Sequence[_Offer]) -> ChangeTa
                 parts=offer.parts,
                 least=interval if sampled else 0.0,
                 whole_law=offer.whole_law,
-                familiar=place_of(block.candidate) in parts.known,
+                familiar=is_body(block.candidate) or place_of(block.candidate) in parts.known,
             )
         )
     friction = {each.block.candidate.rows[0]: each.block.values[:, 0, 0] for each in offers if each.laws}
