@@ -32,7 +32,7 @@ class ChangeGroup:
     their coefficients. parts: laws that change together, each with its own coefficients. common: numbers of the same
     columns in common; empty where links hold them. least: a smaller change is how logs are made, see
     `Parameter.sampled`. whole_law: nonlinear parameters change with the coefficients of the law; their columns are
-    derivatives. familiar: whether the common model has it.
+    derivatives. familiar: whether the common model has it, as it has all links.
     """
 
     block: Block
@@ -219,7 +219,10 @@ def make_table(pooled: Pooled) -> ChangeTable:
 
 
 def make_plain_table(pooled: Pooled) -> ChangeTable:
-    """The same with Coulomb and viscous friction of a joint as one cause, by one factor or each by its own change."""
+    """The same with Coulomb and viscous friction of a joint as one cause, by one factor or each by its own change.
+
+    Shifts in time are no changes here: below its cut-off they look like what friction leaves at each reversal.
+    """
     parts = _CommonColumns(pooled)
     friction: dict[int, list[Block]] = {}
     others = []
@@ -227,7 +230,7 @@ def make_plain_table(pooled: Pooled) -> ChangeTable:
         joint = block.candidate.joint
         if joint is not None and block.candidate.is_friction_of(joint):
             friction.setdefault(joint, []).append(block)
-        else:
+        elif not _is_shift(block.candidate):
             others.append(block)
     causes = [(each,) for each in others] + [tuple(each) for each in friction.values()]
     return _finish_table(parts, [*(parts.offer(each) for each in causes), *_friction_by_one_factor(pooled)])
@@ -248,7 +251,6 @@ def _finish_table(parts: "_CommonColumns", offers: Sequence[_Offer]) -> ChangeTa
         scales = np.repeat(offer.scales, contrast.shape[1])
         values = block.values[..., None] * contrast[pooled.members][:, None, None, :]
         columns = parts.add(block.candidate.rows, values.reshape(*values.shape[:2], -1), scales)
-        sampled = any(each.sampled for each in block.candidate.facts.parameters)
         groups.append(
             ChangeGroup(
                 block,
@@ -257,9 +259,9 @@ def _finish_table(parts: "_CommonColumns", offers: Sequence[_Offer]) -> ChangeTa
                 offer.common,
                 laws=offer.laws,
                 parts=offer.parts,
-                least=interval if sampled else 0.0,
+                least=interval if _is_shift(block.candidate) else 0.0,
                 whole_law=offer.whole_law,
-                familiar=place_of(block.candidate) in parts.known,
+                familiar=is_body(block.candidate) or place_of(block.candidate) in parts.known,
             )
         )
     friction = {each.block.candidate.rows[0]: each.block.values[:, 0, 0] for each in offers if each.laws}
@@ -267,6 +269,11 @@ def _finish_table(parts: "_CommonColumns", offers: Sequence[_Offer]) -> ChangeTa
     mixed = MixedModel(joints, parts.size, np.concatenate(parts.prior))
     own = np.arange(pooled.design.columns.size)
     return ChangeTable(mixed, np.arange(size), own, tuple(groups), contrast, pooled.tuning)
+
+
+def _is_shift(candidate: Candidate) -> bool:
+    """Whether it is a shift in time, of which logs are made in steps."""
+    return any(each.sampled for each in candidate.facts.parameters)
 
 
 class _CommonColumns:
