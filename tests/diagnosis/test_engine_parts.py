@@ -106,8 +106,8 @@ def test_a_fit_from_moments_is_the_least_squares_fit_of_the_whitened_rows(design
     state = State((0, 4, 8), (0.0, 0.0, 0.0))
     fit = solver.fit(state)
     rows, targets = [], []
-    for joint, (matrix, index) in enumerate(zip(columns.matrices, columns.index, strict=True)):
-        white = noise.white(matrix, joint, design.observed, "identify")
+    for joint, index in enumerate(columns.index):
+        white = noise.white(columns.matrix(joint), joint, design.observed, "identify")
         own = np.zeros((len(white), len(fit.columns)))
         for place, column in enumerate(fit.columns):
             found = np.flatnonzero(index == column)

@@ -71,7 +71,7 @@ class FittedModel:
 
     def residual_at(self, joint: int, fit: Fit) -> Array:
         """What a fit leaves at one joint, (rows,), N m."""
-        return self.columns.matrices[joint][:, -1] - self.columns.torque_at(joint, self.coefficients(fit))
+        return self.columns.target_at(joint) - self.columns.torque_at(joint, self.coefficients(fit))
 
 
 def initial_link_widths(design: DesignMatrix) -> Widths | None:
