@@ -106,8 +106,8 @@ def test_a_fit_from_moments_is_the_least_squares_fit_of_the_whitened_rows(design
     state = State((0, 4, 8), (0.0, 0.0, 0.0))
     fit = solver.fit(state)
     rows, targets = [], []
-    for joint, (matrix, index) in enumerate(zip(columns.matrices, columns.index, strict=True)):
-        white = noise.white(matrix, joint, design.observed, "identify")
+    for joint, index in enumerate(columns.index):
+        white = noise.white(columns.matrix(joint), joint, design.observed, "identify")
         own = np.zeros((len(white), len(fit.columns)))
         for place, column in enumerate(fit.columns):
             found = np.flatnonzero(index == column)
@@ -189,7 +189,7 @@ def test_a_small_family_finds_what_drowns_among_all_features(observed: Observed)
     torque = np.concatenate([np.sin(2 * each.position[:, [2]]) + each.acceleration[:, [1]] / 10 for each in motions])
     load = Load(np.tile(torque, 3), np.tile(torque, 3))
     weak = 0.02 * torque[:, 0] * np.concatenate([each.velocity[:, 1] for each in motions]) ** 2
-    banks = [*motion_banks(observed, 1, TUNING.surrogate), *load_banks(observed, 1, load, TUNING.surrogate)]
+    banks = [*motion_banks(observed, TUNING.surrogate)[1], *load_banks(observed, 1, load, TUNING.surrogate)]
     found = [structure_of(left + filtered(weak, observed), 1, each, noise, observed) for each in banks]
     best = max(found, key=lambda each: each.gain)
     assert best.gain > 0.2
@@ -205,7 +205,7 @@ def test_hysteresis_of_another_joint_is_found_at_any_speed(observed: Observed) -
     hose = filtered(
         np.concatenate([dahl_state(each.motion.position[:, 2], 0.2) for each in observed.signals]), observed
     )
-    banks = motion_banks(observed, 0, TUNING.surrogate)
+    banks = motion_banks(observed, TUNING.surrogate)[0]
     found = [structure_of(left + 0.05 * hose, 0, each, noise, observed) for each in banks]
     best = min(found, key=lambda each: each.p_value)
     assert best.depends_on == ("velocity_3",)

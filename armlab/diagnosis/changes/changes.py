@@ -292,7 +292,7 @@ class _CommonColumns:
         self.prior = [np.zeros(self.size)]
         for joint in range(joints):
             loading = np.flatnonzero(design.base.columns >= 10 * joint)
-            self.values[joint].append(np.concatenate([run[joint] for run in design.rigid]))
+            self.values[joint].append(design.rigid[joint])
             self.numbers[joint].append(loading)
         self.common: dict[Place, NDArray[np.intp]] = {}
         self.known = {place_of(block.candidate) for block in design.blocks}

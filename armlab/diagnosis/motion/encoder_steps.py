@@ -33,12 +33,17 @@ def is_made_by_encoder_steps(
     without = fit_servo(windows, values, fixed, tuning.refit_evaluations)
     taken = without.rms**2 - float(np.mean(joint_errors(windows, fit.values)[0] ** 2))
     counted = replay_in_steps(windows.with_integral(without.integral), without.values)
+    enough = tuning.max_share_of_encoder_steps * taken
+    if float(np.mean(joint_errors(counted, without.values)[0] ** 2)) <= enough:
+        return False  # whatever is fitted, it cannot take more than there is
     held = fit_servo(counted, without.values, fixed, tuning.max_evaluations)
+    if held.rms**2 <= enough:
+        return False
     starts = (without.values, fit.values)
     fits = [fit_servo(counted, start, fit.free, tuning.max_evaluations) for start in starts]
     best = min(fits, key=lambda each: each.rms)
     found, made = (to_coordinates(each.values)[number] - to_coordinates(base)[number] for each in (fit, best))
-    return bool(found * made > 0 and held.rms**2 - best.rms**2 > tuning.max_share_of_encoder_steps * taken)
+    return bool(found * made > 0 and held.rms**2 - best.rms**2 > enough)
 
 
 def replay_in_steps(windows: Windows, values: Array) -> Windows:

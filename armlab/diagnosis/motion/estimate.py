@@ -32,7 +32,7 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.servo import HIGHEST, INFINITE_LIMIT, KEYS, LOWEST, NEUTRAL, SCALE, place
-from armlab.diagnosis.motion.windows import Windows, at_rest
+from armlab.diagnosis.motion.windows import Windows, at_rest, needed_torque
 
 LOGARITHMIC = np.isin(KEYS, ("kp", "limit"))  # positive and of any size: fitted as logarithms
 NATURAL_SHARE = 0.1  # of a torque, of critical damping, of an inertia: a step that matters
@@ -103,9 +103,8 @@ def from_coordinates(coordinates: Array) -> Array:
 def coordinate_scales(windows: Windows, values: Array) -> Array:
     """Step of each coordinate that matters, (parameters,): of torques by what the motion needs, of a small motor's
     numbers by its inertia and gain."""
-    scales, inertia = SCALE.copy(), float(np.median(windows.inertia))
+    scales, (inertia, torque) = SCALE.copy(), windows.sizes
     critical = np.sqrt(float(values[place("kp")]) * (inertia + max(float(values[place("armature")]), 0.0)))
-    torque = float(np.sqrt(np.mean(needed_torque(windows, 0.0)[-1] ** 2)))
     natural = {"damping": critical, "kd": critical, "armature": inertia, "friction": torque, "static_excess": torque}
     natural["limit_slope"] = torque  # at 1 rad/s (m/s)
     for key, size in natural.items():
@@ -413,18 +412,6 @@ def _regress(windows: Windows, base: Array, moving_speed: float) -> tuple[Array,
     solution = np.linalg.lstsq(columns, known[rows], rcond=None)[0]
     found[[place("kp"), place("damping"), place("friction")]] = np.maximum(solution, 0.0)
     return found, needed
-
-
-def needed_torque(windows: Windows, armature: float) -> tuple[int, Array, Array]:
-    """Torque that the measured motion needs beside friction, N m, and the velocity, rad/s, (windows, instants) each.
-
-    The instants are those of every n-th step; n comes first.
-    """
-    stride = max(round(0.02 / windows.step_s), 1)
-    velocity = np.gradient(windows.measured[:, ::stride], stride * windows.step_s, axis=1)
-    velocity = 0.5 * velocity + 0.25 * (np.roll(velocity, 1, axis=1) + np.roll(velocity, -1, axis=1))
-    acceleration = np.gradient(velocity, stride * windows.step_s, axis=1)
-    return stride, velocity, (windows.inertia[:, ::stride] + armature) * acceleration + windows.load[:, ::stride]
 
 
 def unsaturated_limit(windows: Windows, values: Array) -> float:

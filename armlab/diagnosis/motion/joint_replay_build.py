@@ -4,7 +4,9 @@ from pathlib import Path
 
 import cffi
 
-LANES = 8  # windows that are replayed at once
+LANES = 4  # windows that are computed in one instruction
+GROUPS = 2  # of as many windows, that are replayed at once
+TABLES = 8  # of a window, beside its commands
 MOST_JOINTS = 16  # of an arm whose joints are replayed together
 
 DECLARED = """
@@ -20,17 +22,18 @@ typedef struct {
     const int64_t *begin, *row, *run, *start;
     const double *fraction;
 } Stretch;
-void replay_joint(const Stretch *at, int64_t sets, const Servo *servos, double *integrals, double *path,
+void replay_joint(const Stretch *at, int64_t sets, const Servo *servos, double *integrals, double *room,
     double *out);
 typedef struct {
     int64_t rows, every;
     const double *mass, *moves;
 } MassTable;
 void replay_arm(int64_t joints, const Stretch *at, const Servo *servos, const MassTable *table, double *integrals,
-    double *position, double *velocity);
+    double *room, double *position, double *velocity);
 """
 
-DEFINED = f"#define LANES {LANES}\n#define MOST_JOINTS {MOST_JOINTS}\n"
+NUMBERS = {"LANES": LANES, "GROUPS": GROUPS, "TABLES": TABLES, "MOST_JOINTS": MOST_JOINTS}
+DEFINED = "".join(f"#define {name} {number}\n" for name, number in NUMBERS.items())
 ffibuilder = cffi.FFI()
 ffibuilder.cdef(DEFINED + DECLARED)
 ffibuilder.set_source(

@@ -10,6 +10,7 @@ that the encoder's error in the first state is forgotten where samples count.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -88,6 +89,11 @@ class Windows:
         """Standard deviation of the errors that the steps of the encoder make, rad (m)."""
         return float(self.encoder_step / np.sqrt(12))
 
+    @cached_property
+    def sizes(self) -> tuple[float, float]:
+        """The median inertia, kg m2, and the root mean square of the torque that the motion needs, N m (kg, N)."""
+        return float(np.median(self.inertia)), float(np.sqrt(np.mean(needed_torque(self, 0.0)[-1] ** 2)))
+
     def with_integral(self, integral: Array) -> "Windows":
         """The windows with other integrals of the drive at the start of each run, (runs,), N m."""
         return replace(self, integral=np.ascontiguousarray(integral))
@@ -115,6 +121,18 @@ class Windows:
             fraction=self.fraction[kept],
             position=self.position[kept],
         )
+
+
+def needed_torque(windows: Windows, armature: float) -> tuple[int, Array, Array]:
+    """Torque that the measured motion needs beside friction, N m, and the velocity, rad/s, (windows, instants) each.
+
+    The instants are those of every n-th step; n comes first.
+    """
+    stride = max(round(0.02 / windows.step_s), 1)
+    velocity = np.gradient(windows.measured[:, ::stride], stride * windows.step_s, axis=1)
+    velocity = 0.5 * velocity + 0.25 * (np.roll(velocity, 1, axis=1) + np.roll(velocity, -1, axis=1))
+    acceleration = np.gradient(velocity, stride * windows.step_s, axis=1)
+    return stride, velocity, (windows.inertia[:, ::stride] + armature) * acceleration + windows.load[:, ::stride]
 
 
 def smooth_motion(run: MotionRun, read_delay: Array, tuning: MotionTuning = DEFAULT) -> Motion:

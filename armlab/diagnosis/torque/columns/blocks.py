@@ -85,14 +85,16 @@ def whitened_rows(
 
 def rows_of_fit(columns: Columns, fit: Fit, lengths: Array, joint: int) -> tuple[Array, Array]:
     """Design (rows, parameters) of a fit at a joint, links and then effects in their order, and what it leaves."""
-    matrix, index = columns.matrices[joint], columns.index[joint][:-1]
+    index = columns.index[joint][:-1]
     base, rank = fit.links.shape
     loading, chosen = np.flatnonzero(index < base), np.flatnonzero(np.isin(index, fit.columns))
-    rigid = matrix[:, loading] / lengths[index[loading]]
-    effects = matrix[:, chosen] / lengths[index[chosen]]
-    left = matrix[:, -1] - rigid @ fit.coefficients[index[loading]] - effects @ fit.coefficients[index[chosen]]
+    rigid = columns.pick(joint, loading) / lengths[index[loading]]
+    effects = columns.pick(joint, chosen) / lengths[index[chosen]]
+    left = (
+        columns.target_at(joint) - rigid @ fit.coefficients[index[loading]] - effects @ fit.coefficients[index[chosen]]
+    )
     at = {int(column): rank + place for place, column in enumerate(fit.columns)}
-    design = np.zeros((len(matrix), rank + len(fit.columns)))
+    design = np.zeros((len(left), rank + len(fit.columns)))
     design[:, :rank] = rigid @ fit.links[index[loading]]
     design[:, [at[int(column)] for column in index[chosen]]] = effects
     return design, left

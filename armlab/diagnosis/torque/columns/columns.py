@@ -40,22 +40,34 @@ def place_of(candidate: Candidate) -> Place:
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Per joint the rows that its torque has: matrix (rows, own columns), index (own columns,) into all columns.
+    """Per joint the columns that its torque has: parts (rows, some own columns), index (own columns,) into all columns.
 
     The first `base` columns are the base parameters; the last own column of each joint is the torque that is to be
-    explained, and has the index `size`.
+    explained, and has the index `size`. The parts are those of the blocks, which many Columns share.
     """
 
     base: int
     size: int
     groups: tuple[Group, ...]
-    matrices: tuple[Array, ...]
+    parts: tuple[tuple[Array, ...], ...]
     index: tuple[NDArray[np.intp], ...]
 
     @property
     def joints(self) -> int:
         """Number of joints."""
-        return len(self.matrices)
+        return len(self.parts)
+
+    def matrix(self, joint: int) -> Array:
+        """All own columns of a joint, (rows, own columns), in an array of their own."""
+        return np.column_stack(self.parts[joint])
+
+    def pick(self, joint: int, places: NDArray[np.intp]) -> Array:
+        """Some of the own columns of a joint, (rows, places)."""
+        ends = np.cumsum([each.shape[1] for each in self.parts[joint]])
+        out = np.empty((len(places), len(self.parts[joint][0])))
+        for row, place, part in zip(out, places, np.searchsorted(ends, places, side="right"), strict=True):
+            row[:] = self.parts[joint][part][:, place - ends[part]]
+        return out.T
 
     def torque_of(self, coefficients: Array) -> Array:
         """Torque of coefficients (size,), (rows, joints)."""
@@ -65,12 +77,16 @@ class Columns:
         """Torque of coefficients (size,) at one joint, (rows,)."""
         own = coefficients[self.index[joint][:-1]]
         used = np.flatnonzero(own)
-        return np.asarray(self.matrices[joint][:, used] @ own[used])
+        return np.asarray(self.pick(joint, used) @ own[used])
+
+    def target_at(self, joint: int) -> Array:
+        """The torque of a joint that is to be explained, (rows,)."""
+        return self.parts[joint][-1][:, 0]
 
     @property
     def target(self) -> Array:
         """The torque that is to be explained, (rows, joints)."""
-        return np.column_stack([matrix[:, -1] for matrix in self.matrices])
+        return np.column_stack([own[-1] for own in self.parts])
 
 
 def filtered_columns(candidate: Candidate, scenes: Sequence[Scene], observed: Observed, same_filter: bool) -> Array:
@@ -82,11 +98,14 @@ def filtered_columns(candidate: Candidate, scenes: Sequence[Scene], observed: Ob
     return np.concatenate(parts)
 
 
-def base_columns(arm: Arm, base: BaseParameters, signals: Signals) -> list[Array]:
-    """Per joint the columns of the base parameters that load it, through the filter of the torque."""
-    rigid = observation_matrix(arm, signals.motion).reshape(signals.motion.samples, len(arm), -1)
-    loading = (base.columns[base.columns >= 10 * joint] for joint in range(len(arm)))
-    return [np.asarray(signals.filter(rigid[:, joint, chosen])) for joint, chosen in enumerate(loading)]
+def base_columns(arm: Arm, base: BaseParameters, runs: Sequence[Signals]) -> list[Array]:
+    """Per joint the columns of the base parameters that load it, (rows of all runs, columns), through the filter."""
+    parts: list[list[Array]] = [[] for _ in arm.joints]
+    for signals in runs:
+        rigid = observation_matrix(arm, signals.motion).reshape(signals.motion.samples, len(arm), -1)
+        for joint, own in enumerate(parts):
+            own.append(np.asarray(signals.filter(rigid[:, joint, base.columns[base.columns >= 10 * joint]])))
+    return [np.concatenate(own) for own in parts]
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,12 +117,12 @@ class Block:
     values: Array
 
 
-def stack_columns(base: BaseParameters, rigid: list[list[Array]], blocks: Sequence[Block], target: Array) -> Columns:
-    """All columns side by side. rigid: by run, by joint. target: (rows, joints)."""
+def stack_columns(base: BaseParameters, rigid: list[Array], blocks: Sequence[Block], target: Array) -> Columns:
+    """All columns side by side. rigid: by joint. target: (rows, joints)."""
     joints = target.shape[1]
     start = len(base)
-    groups, matrices, index = [], [], []
-    own: list[list[Array]] = [[] for _ in range(joints)]
+    groups, index = [], []
+    own = [[each] for each in rigid]
     names: list[list[NDArray[np.intp]]] = [[] for _ in range(joints)]
     for block in blocks:
         columns = np.arange(start, start + block.values.shape[2])
@@ -113,11 +132,10 @@ def stack_columns(base: BaseParameters, rigid: list[list[Array]], blocks: Sequen
             own[row].append(block.values[:, number])
             names[row].append(columns)
     for joint in range(joints):
-        first = np.concatenate([run[joint] for run in rigid])
-        matrices.append(np.column_stack([first, *own[joint], target[:, joint]]))
+        own[joint].append(target[:, [joint]])
         loading = np.flatnonzero(base.columns >= 10 * joint)
         index.append(np.concatenate([loading, *names[joint], [start]]).astype(np.intp))
-    return Columns(len(base), start, tuple(groups), tuple(matrices), tuple(index))
+    return Columns(len(base), start, tuple(groups), tuple(map(tuple, own)), tuple(index))
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +180,8 @@ def compute_moments(columns: Columns, noise: Noise, observed: Observed) -> Momen
     """Whitens all columns and multiplies them."""
     gram = np.zeros((columns.size + 1, columns.size + 1))
     heldout, rows = [], []
-    for joint, (matrix, index) in enumerate(zip(columns.matrices, columns.index, strict=True)):
+    for joint, index in enumerate(columns.index):
+        matrix = columns.matrix(joint)
         identify = _gram(noise.white(matrix, joint, observed, "identify"))
         gram[np.ix_(index, index)] += identify[0]
         heldout.append(_gram(noise.white(matrix, joint, observed, "validate"))[0])

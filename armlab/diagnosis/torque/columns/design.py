@@ -33,7 +33,7 @@ from problem.motion import Motion
 
 @dataclass(frozen=True, eq=False)
 class DesignMatrix:
-    """rigid: filtered columns of the base parameters by run and joint. target: measured less simulated torque,
+    """rigid: filtered columns of the base parameters by joint. target: measured less simulated torque,
     filtered, (rows, joints). scenes: one a run, for the present model; calm: the same with the calm motion, for
     candidates that follow the model. blocks: the candidates' filtered columns. families: those that offered them.
     features, banks: of each joint, for surrogates: many of everything, and few of one kind each.
@@ -44,7 +44,7 @@ class DesignMatrix:
     simulation: Simulation
     base: BaseParameters
     prior: LinkPrior | None
-    rigid: list[list[Array]]
+    rigid: list[Array]
     target: Array
     scenes: tuple[Scene, ...]
     calm: tuple[Scene, ...]
@@ -138,7 +138,7 @@ def build_design_matrix(
 ) -> DesignMatrix:
     """The table before any candidate is on it."""
     arm = simulation.arm
-    rigid = [base_columns(arm, base, signals) for signals in observed.signals]
+    rigid = base_columns(arm, base, observed.signals)
     simulated = np.concatenate([simulation.filtered(signals) for signals in observed.signals])
     inertial = simulation.inertial if simulation.inertial is not None else np.zeros(10 * len(arm))
     scenes = tuple(_scene_of_run(signals, signals.motion, simulation, inertial) for signals in observed.signals)

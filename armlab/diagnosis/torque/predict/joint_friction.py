@@ -88,9 +88,10 @@ class _Sized:
         observed = self.model.design.observed
         used = np.flatnonzero(rows_in(observed.used(joint - 1), observed.rows))
         near = used[np.argsort(np.abs(np.abs(own[used]) - speed))[: max(int(NEAREST_ROWS * len(used)), 1)]]
-        matrix, index = self.model.columns.matrices[joint - 1], self.model.columns.index[joint - 1]
-        place = [int(np.flatnonzero(index == each)[0]) for each in self.model.solver.groups[group].columns]
-        return np.asarray(np.mean(np.sign(own[near])[:, None] * matrix[near][:, place], axis=0))
+        index = self.model.columns.index[joint - 1]
+        place = np.array([int(np.flatnonzero(index == each)[0]) for each in self.model.solver.groups[group].columns])
+        laid = self.model.columns.pick(joint - 1, place)[near]
+        return np.asarray(np.mean(np.sign(own[near])[:, None] * laid, axis=0))
 
 
 def _depends_on_speed_alone(candidate: Candidate) -> bool:

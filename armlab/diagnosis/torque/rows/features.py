@@ -172,16 +172,36 @@ def flexible_features(observed: Observed, joint: int, rng: np.random.Generator, 
     return _standardise(parts)
 
 
-def motion_banks(observed: Observed, joint: int, tuning: SurrogateTuning) -> tuple[Features, ...]:
-    """Few features each, of one kind of dependence on the motion.
+def motion_banks(observed: Observed, tuning: SurrogateTuning) -> tuple[tuple[Features, ...], ...]:
+    """Of each joint few features each, of one kind of dependence on the motion.
 
     What depends on little drowns in the noise of what does not matter where hundreds of features are taught at once.
+    Those of another joint's motion alone are the same ones for all joints.
     """
+    joints = range(observed.joints)
+    theirs = [_banks_of_velocity(observed, other, tuning) for other in joints]
+    return tuple(_banks_of_joint(observed, joint, theirs, tuning) for joint in joints)
+
+
+def _banks_of_velocity(observed: Observed, other: int, tuning: SurrogateTuning) -> tuple[Features, Features]:
+    """Of how often a joint (from 0) has turned, and of its velocity now and before."""
+    runs, names = whole_runs(observed), (f"velocity_{other + 1}",)
+    smooth = _smooth_signs(runs.velocity[:, other], tuning.sign_widths)
+    late = [runs.lags(values, tuning.memories_s) for values in (smooth[:, 2], runs.velocity[:, other])]
+    moved = [_hats(observed.kept("velocity")[:, other], tuning.hats), runs.filtered(np.column_stack([smooth, *late]))]
+    turned = runs.filtered(runs.turns(other, tuning.turning_ways))
+    return _standardise([(turned, names)]), _standardise([(columns, names) for columns in moved])
+
+
+def _banks_of_joint(
+    observed: Observed, joint: int, theirs: Sequence[tuple[Features, Features]], tuning: SurrogateTuning
+) -> tuple[Features, ...]:
+    """theirs: `_banks_of_velocity` of each joint."""
     position = observed.kept("position")
     velocity = observed.kept("velocity")
     acceleration = observed.kept("acceleration")
     place, speed, change = (f"{name}_{joint + 1}" for name in ("position", "velocity", "acceleration"))
-    runs, own, hats, memories = whole_runs(observed), velocity[:, joint], tuning.hats, tuning.memories_s
+    runs, own, memories = whole_runs(observed), velocity[:, joint], tuning.memories_s
     signs = _smooth_signs(runs.velocity[:, joint], tuning.sign_widths)
     lagged = [runs.lags(values, memories) for values in (signs[:, 1], runs.velocity[:, joint])]
     fast = [_hats(own, tuning.fine_hats), runs.filtered(np.column_stack([signs, *lagged]))]
@@ -194,17 +214,11 @@ def motion_banks(observed: Observed, joint: int, tuning: SurrogateTuning) -> tup
         _standardise([(_hats(position[:, joint], tuning.fine_position_hats), (place,))]),
         _standardise([(driven, (speed, change))]),
     ]
-    for other in range(observed.joints):
-        theirs = f"velocity_{other + 1}"
-        turned = runs.filtered(runs.turns(other, tuning.turning_ways))
-        out.append(_standardise([(turned, (theirs,))]))
+    for other, (turned, moved) in enumerate(theirs):
+        out.append(turned)
         if other != joint:
             both = _products(position[:, joint], position[:, other], tuning.product_positions)
-            smooth = _smooth_signs(runs.velocity[:, other], tuning.sign_widths)
-            late = [runs.lags(values, memories) for values in (smooth[:, 2], runs.velocity[:, other])]
-            moved = [_hats(velocity[:, other], hats), runs.filtered(np.column_stack([smooth, *late]))]
-            out.append(_standardise([(both, (place, f"position_{other + 1}"))]))
-            out.append(_standardise([(columns, (theirs,)) for columns in moved]))
+            out += [_standardise([(both, (place, f"position_{other + 1}"))]), moved]
     return tuple(out)
 
 

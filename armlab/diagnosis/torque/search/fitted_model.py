@@ -71,7 +71,7 @@ class FittedModel:
 
     def residual_at(self, joint: int, fit: Fit) -> Array:
         """What a fit leaves at one joint, (rows,), N m."""
-        return self.columns.matrices[joint][:, -1] - self.columns.torque_at(joint, self.coefficients(fit))
+        return self.columns.target_at(joint) - self.columns.torque_at(joint, self.coefficients(fit))
 
 
 def initial_link_widths(design: DesignMatrix) -> Widths | None:
@@ -99,7 +99,7 @@ def fit_background(design: DesignMatrix, families: Sequence[Family], seed: int, 
     observed, joints = moved.observed, range(moved.observed.joints)
     flexible = [flexible_features(observed, joint, rng, tuning) for joint in joints]
     made = tuple(fold_features(each, observed, joint, tuning) for joint, each in enumerate(flexible))
-    banks = tuple(motion_banks(observed, joint, tuning) for joint in joints)
+    banks = motion_banks(observed, tuning)
     whole = replace(moved.with_candidates(families, _split_by_run(moved, left)), features=made, banks=banks)
     rough = _fit_model(
         whole, _white_noise(left, whole), lambda solver: background_state(solver, initial_link_widths(whole))
