@@ -497,9 +497,6 @@ class PlausibilityTuning:
 class IntervalTuning:
     """Intervals of named parameters."""
 
-    confidence: float = tuned(
-        0.95, "chance that an interval holds the true value", "probability", source="convention", most=0.999999
-    )
     factor: float = tuned(
         1.45,
         "widens intervals: what laws leave out at reversals is no noise",
