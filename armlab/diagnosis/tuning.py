@@ -432,14 +432,6 @@ class ClaimTuning:
 class NamingTuning:
     """When a finding has a name, a class of names, or none; and what is weighed for that."""
 
-    level: float = tuned(
-        0.9,
-        "of a name, or of the names of a class together, that is claimed",
-        "probability",
-        source="wanted: a name that is claimed is wrong once in ten times at most",
-        least=0.5,
-        most=1.0,
-    )
     least_names: float = tuned(
         0.8,
         "of the names of a class together, without `unknown`; with less a finding is unknown",
@@ -448,7 +440,6 @@ class NamingTuning:
         least=0.5,
         most=1.0,
     )
-    max_class: int = tuned(4, "of a class; where more are needed, a finding is unknown", "names", least=1)
     least_unnamed_fall: float = tuned(
         0.05,
         "fall from which on a law without a name is a finding",
