@@ -464,12 +464,6 @@ class NamingTuning:
 class PlausibilityTuning:
     """When numbers that no engineer expects, or that are hardly known, withdraw a finding."""
 
-    overwhelming_evidence: float = tuned(
-        600.0,
-        "what a name with a parameter outside its plausible range adds to the log evidence",
-        "log likelihood",
-        source="ten times pruning.least_evidence: evidence counts structure that the library lacks, too",
-    )
     max_interval_ratio: float = tuned(
         30.0,
         "highest over lowest end of the interval of a positive parameter that is known",
