@@ -432,14 +432,6 @@ class ClaimTuning:
 class NamingTuning:
     """When a finding has a name, a class of names, or none; and what is weighed for that."""
 
-    level: float = tuned(
-        0.9,
-        "of a name, or of the names of a class together, that is claimed",
-        "probability",
-        source="wanted: a name that is claimed is wrong once in ten times at most",
-        least=0.5,
-        most=1.0,
-    )
     least_names: float = tuned(
         0.8,
         "of the names of a class together, without `unknown`; with less a finding is unknown",
@@ -448,7 +440,6 @@ class NamingTuning:
         least=0.5,
         most=1.0,
     )
-    max_class: int = tuned(4, "of a class; where more are needed, a finding is unknown", "names", least=1)
     least_unnamed_fall: float = tuned(
         0.05,
         "fall from which on a law without a name is a finding",
@@ -473,12 +464,6 @@ class NamingTuning:
 class PlausibilityTuning:
     """When numbers that no engineer expects, or that are hardly known, withdraw a finding."""
 
-    overwhelming_evidence: float = tuned(
-        600.0,
-        "what a name with a parameter outside its plausible range adds to the log evidence",
-        "log likelihood",
-        source="ten times pruning.least_evidence: evidence counts structure that the library lacks, too",
-    )
     max_interval_ratio: float = tuned(
         30.0,
         "highest over lowest end of the interval of a positive parameter that is known",
@@ -497,9 +482,6 @@ class PlausibilityTuning:
 class IntervalTuning:
     """Intervals of named parameters."""
 
-    confidence: float = tuned(
-        0.95, "chance that an interval holds the true value", "probability", source="convention", most=0.999999
-    )
     factor: float = tuned(
         1.45,
         "widens intervals: what laws leave out at reversals is no noise",

@@ -9,9 +9,7 @@ import pytest
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.result import Diagnosis
-from armlab.diagnosis.torque import stages
 from armlab.diagnosis.torque.diagnose import diagnose
-from armlab.diagnosis.torque.evidence.friction_curves import find_friction_curves
 from armlab.diagnosis.torque.predict.found_model import model_found
 from armlab.identification.model_file import read_model, write_model
 from problem.motion import Motion
@@ -53,16 +51,10 @@ def test_friction_that_steps_between_plateaus_is_a_curve_through_both(step_found
     np.testing.assert_allclose(torques[fast], 2.4, atol=0.25)
 
 
-def test_what_is_unknown_and_follows_the_own_velocity_of_a_joint_is_a_friction_curve(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    others = tuple(each for each in stages.BY_TESTS if each.run is not find_friction_curves)
-    monkeypatch.setattr(stages, "BY_TESTS", others)
-    found = diagnose(cases.recording(STEP_AT_JOINT_2, seconds=10.0))
-    (claim,) = (each for each in found.claims if each.joint == 2)
-    assert claim.effect == "friction_curve"
+def test_what_is_unknown_and_follows_the_own_velocity_of_a_joint_is_a_friction_curve(step_found: Diagnosis) -> None:
+    (claim,) = (each for each in step_found.claims if each.joint == 2)
     assert claim.evidence.rms_after < claim.evidence.rms_before / 3
-    assert "what is left at joint 2 is a friction curve" in {each.what for each in found.steps}
+    assert "what is left at joint 2 is a friction curve" in {each.what for each in step_found.steps}
 
 
 def test_the_model_of_a_curve_predicts_the_same_after_a_round_trip(step_found: Diagnosis, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 from armlab.common.errors import InputError
 from armlab.diagnosis.choice import Example, Weights, fit_lapse, fit_weights, probabilities, with_lapse
 from armlab.diagnosis.result import Claim, Rival, Weighed, WeighedName
-from armlab.diagnosis.settings import Settings, vary
+from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.evidence.evidence import Evidence
 from armlab.diagnosis.torque.names.decide import calibrated_weights, named_claims, naming_of, unknown_limit
 from armlab.diagnosis.torque.names.findings import Statement, statement_of
@@ -159,10 +159,9 @@ def test_a_law_without_a_name_is_a_finding_only_where_held_out_errors_fall() -> 
     assert [each.effect for each in named_claims([certain], Settings())] == ["payload"]
 
 
-def test_more_than_four_names_are_no_class() -> None:
-    names = weighed(0.05, **{f"law_{number}": 0.19 for number in range(5)})
-    assert naming_of(names, Settings()).is_unknown
-    assert len(naming_of(names, vary(Settings(), "naming.max_class", 5)).claimed) == 5
+def test_more_than_three_names_are_no_class() -> None:
+    assert len(naming_of(weighed(0.05, law_0=0.35, law_1=0.35, law_2=0.25), Settings()).claimed) == 3
+    assert naming_of(weighed(0.06, **{f"law_{number}": 0.235 for number in range(4)}), Settings()).is_unknown
 
 
 def test_a_class_that_may_be_none_of_its_names_is_unknown() -> None:

@@ -36,12 +36,10 @@ class ObservedStandIn:
     signals: tuple[SignalsStandIn, ...] = (SignalsStandIn(),)
 
 
-def reason(
-    candidate: Candidate, *values: tuple[str, float, Interval], known: bool = False, exact: bool = False
-) -> str | None:
+def reason(candidate: Candidate, *values: tuple[str, float, Interval], exact: bool = False) -> str | None:
     named = tuple(ParameterValue(name, value, interval, "") for name, value, interval in values)
     observed: Any = ObservedStandIn()
-    return reason_implausible(candidate, named, observed, known=known, exact=exact, tuning=PlausibilityTuning())
+    return reason_implausible(candidate, named, observed, exact=exact, tuning=PlausibilityTuning())
 
 
 def test_a_coefficient_that_may_be_zero_is_no_finding() -> None:
@@ -52,10 +50,9 @@ def test_a_coefficient_that_is_known_is_a_finding() -> None:
     assert reason(ViscousFriction.at(ARM, 1), ("coefficient", 0.9, (0.7, 1.1))) is None
 
 
-def test_friction_does_not_warm_within_seconds_unless_the_evidence_is_overwhelming() -> None:
+def test_friction_does_not_warm_within_seconds() -> None:
     drift = ViscousDrift.at(ARM, 1, shape=(3.0,))
     assert "not plausible" in str(reason(drift, ("time_constant", 3.0, (2.0, 4.0))))
-    assert reason(drift, ("time_constant", 3.0, (2.0, 4.0)), known=True) is None
     assert reason(drift, ("time_constant", 600.0, (400.0, 800.0))) is None
 
 
@@ -64,7 +61,7 @@ def test_a_shift_below_one_sampling_interval_is_a_finding_of_a_model_alone_that_
     shift: Candidate,
 ) -> None:
     short = ("seconds", 0.0006, (0.0005, 0.0007))
-    assert "sampling interval" in str(reason(shift, short, known=True))
+    assert "sampling interval" in str(reason(shift, short))
     assert reason(shift, short, exact=True) is None
     assert reason(shift, ("seconds", 0.004, (0.003, 0.005))) is None
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.design import DesignMatrix
 from armlab.diagnosis.torque.evidence.added_body import possible_links, with_possible_bodies
-from armlab.diagnosis.torque.evidence.friction_curves import find_friction_curves, name_friction_curves
+from armlab.diagnosis.torque.evidence.friction_curves import name_friction_curves
 from armlab.diagnosis.torque.evidence.plausibility import (
     unclaim_implausible,
     withdraw_contradicted,
@@ -52,7 +52,6 @@ BY_TESTS = (
         "testing claims",
     ),
     Stage(scan_what_is_left, "What passes is taken off, and scans look for gaps, pushes and waves in the rest."),
-    Stage(find_friction_curves, "A free curve of friction replaces formulas where it is clearly better than each."),
     Stage(prefer_one_body, "One body that can exist replaces loose masses; bodies that cannot exist leave."),
     Stage(withdraw_implausible, "Friction with numbers that no arm has gives way to usual friction."),
     Stage(withdraw_contradicted, "A name leaves where as much structure is left at its joint as it explains."),

@@ -23,7 +23,6 @@ from armlab.diagnosis.torque.evidence.pushes import make_stretch, reason_no_cont
 from armlab.diagnosis.torque.rows.data import rows_in
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_values, split_fit
 from armlab.diagnosis.torque.search.refine import profile_without
-from armlab.diagnosis.torque.search.search import Search, rival_formulas
 from armlab.diagnosis.tuning import EvidenceTuning
 
 
@@ -164,33 +163,7 @@ class Judge:
     def compared(self) -> StatesCompared:
         """The state beside the simpler groups that its own contain."""
         more = {other for group in self.state.groups for other in self.simpler(group)}
-        more |= {other for formula in self._best_formulas.values() for other in formula.groups}
         return StatesCompared(self.model, self.state, frozenset(more))
-
-    @cached_property
-    def _best_formulas(self) -> dict[int, State]:
-        """For each law of the last resort, the state with the likeliest formula in its place."""
-        groups = self.model.solver.groups
-        last = [group for group in self.state.groups if groups[group].candidate.facts.last_resort]
-        return {
-            group: max(self._with_formulas(group), key=lambda each: self.model.solver.fit(each).score) for group in last
-        }
-
-    def _with_formulas(self, group: int) -> list[State]:
-        """The states with usual friction, and with each formula that physics allows, in the place of a law."""
-        groups = self.model.solver.groups
-        search, out = Search(self.model.solver, self.model.design.settings, True, 0), [self._usual_in_place(group)]
-        for formula in rival_formulas(groups, group):
-            replaced = groups[formula].candidate.replaces
-            kept = (each for each in self.simpler(group) if groups[each].candidate.effect not in replaced)
-            state = State(tuple(sorted({*self.state.minus(group).groups, *kept, formula})), self.state.widths)
-            if search.objection(state, formula) is None:
-                out.append(state)
-        return out
-
-    def _usual_in_place(self, group: int) -> State:
-        """The state with usual friction in the place of a law."""
-        return State(tuple(sorted({*self.state.minus(group).groups, *self.simpler(group)})), self.state.widths)
 
     def effects(self) -> dict[int, Evidence]:
         """Evidence for each group."""
@@ -206,9 +179,6 @@ class Judge:
             evidence = self._against(state.minus(group), tested, candidate.rows, -losses[group])
             if self.simpler(group) and not self._in_place_of_usual(group):
                 evidence = self._beyond_usual(group)
-            if group in self._best_formulas:
-                evidence, better = self._beyond_formulas(group, evidence)
-                objection = objection or better
             if candidate.facts.single_event:
                 evidence = replace(evidence, repeatable=False)
                 objection = self._pushed(group)
@@ -288,11 +258,6 @@ class Judge:
         """See `Solver.contained`."""
         return self.model.solver.contained(group)
 
-    def in_place_of(self, group: int) -> set[int]:
-        """Groups that take the place of a law that is withdrawn: usual friction, or the likeliest formula."""
-        formula = self._best_formulas.get(group)
-        return set(self.simpler(group)) if formula is None else set(formula.groups) - set(self.state.groups)
-
     def _in_place_of_usual(self, group: int) -> bool:
         """Whether one law stands where usual friction would need as many numbers, and is likelier than that.
 
@@ -318,29 +283,6 @@ class Judge:
             score = self.model.solver.fit(state).score - self.model.solver.fit(less).score
             found.append(self._against(less, tested, groups[group].candidate.rows, score))
         return min(found, key=lambda each: each.gain)
-
-    def _beyond_formulas(self, group: int, beyond: Evidence) -> tuple[Evidence, str | None]:
-        """The evidence against the likeliest formula, where it is weaker, and an objection where a formula is enough.
-
-        beyond: the evidence against usual friction. A formula is enough where it is nearly as likely, or where it
-        leaves no more than the form of a law does.
-        """
-        solver, formula, usual = self.model.solver, self._best_formulas[group], self._usual_in_place(group)
-        tuning = self.model.design.settings.tuning
-        if beyond.score < tuning.pruning.least_evidence:
-            return beyond, "usual friction is nearly as likely"
-        if formula == usual:
-            return beyond, None
-        rows, tested = solver.candidate(group).rows, (beyond.p_value, self.looks(group))
-        against = self._against(formula, tested, rows, solver.fit(self.state).score - solver.fit(formula).score)
-        weaker = replace(min((beyond, against), key=lambda each: each.gain), score=min(beyond.score, against.score))
-        if weaker.score < tuning.pruning.least_evidence:
-            return weaker, "a formula is nearly as likely"
-        gains = self.compared.gains(solver.fit(formula), solver.fit(usual), rows)[rows[0]]
-        explained = max(each.share for each in gains)
-        left = against.gain / (1 + max(against.gain, 0.0))
-        enough = left <= tuning.unknown.form_error_share * explained
-        return weaker, "a formula fits as well but for its form" if enough else None
 
     def _against(self, less: State, tested: tuple[float, int], rows: tuple[int, ...], score: float) -> Evidence:
         """Evidence for the state against a smaller one."""

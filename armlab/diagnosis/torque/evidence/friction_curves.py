@@ -1,10 +1,12 @@
-"""Friction that no formula fits: looked for when the formulas have their shapes and the other effects their names."""
+"""Friction that no formula fits: looked for when the formulas have their shapes and the other effects their names.
+
+A curve beside the formulas of a search would take their place before their shapes are known.
+"""
 
 from dataclasses import replace
 
 from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.solver import State
-from armlab.diagnosis.torque.evidence.pruning import test_again
 from armlab.diagnosis.torque.evidence.unknown import (
     is_form_error,
     is_structured,
@@ -14,26 +16,6 @@ from armlab.diagnosis.torque.evidence.unknown import (
 )
 from armlab.diagnosis.torque.search.fitted_model import FittedModel
 from armlab.diagnosis.torque.search.search import Search, Step, rival_formulas
-
-
-def find_friction_curves(belief: Belief) -> Belief:
-    """The belief with a curve in the place of a joint's friction where it is clearly better than every formula.
-
-    A curve beside the formulas of a search would take their place before their shapes are known. Here a curve that
-    fails a test changes nothing.
-    """
-    for joint in range(1, belief.model.columns.joints + 1):
-        model = belief.model
-        least = model.solver.fit(model.state).score + belief.tuning.pruning.least_evidence
-        state = _likeliest_curve(model, joint)
-        if state is None or model.solver.fit(state).score < least:
-            continue
-        (group,) = set(state.groups) - set(model.state.groups)
-        step = Step(f"friction curve at joint {joint}", model.solver.fit(state).score)
-        tried = test_again(belief.with_state(state, step))
-        if group in tried.model.state.groups:
-            belief = tried
-    return belief
 
 
 def name_friction_curves(belief: Belief) -> Belief:

@@ -1,8 +1,8 @@
 """Findings whose numbers no engineer believes, or that say nothing: no names, with the reason in the log.
 
 What an effect's parameters are on arms stands on the effect (`Parameter.plausible`, with its source). A law that fits
-with other numbers stands for structure that the library lacks, unless the evidence is overwhelming. An interval that
-holds zero, several orders of magnitude or a whole circle is no knowledge of a parameter.
+with other numbers stands for structure that the library lacks. An interval that holds zero, several orders of magnitude
+or a whole circle is no knowledge of a parameter.
 """
 
 from collections.abc import Mapping, Sequence
@@ -94,16 +94,14 @@ def doubtful_names(
     wide, observed = extend_with_shapes(model), model.design.observed
     tuning = model.design.settings.tuning
     out = {}
-    for group, evidence in effects.items():
+    for group in effects:
         coefficients = model.solver.values(model.fit, group)
         candidate = model.candidate(group).first_name(coefficients, model.design.scenes)
         covariance = wide.covariance(group)
         values = parameter_values(candidate, coefficients, covariance, wide.factor)
         if model.solver.simulated[group].any():
             values = tuple(map(_as_difference, values))
-        known = evidence.gain >= tuning.pruning.self_evident_gain
-        known &= evidence.score >= tuning.plausibility.overwhelming_evidence
-        reason = reason_implausible(candidate, values, observed, known=known, exact=exact, tuning=tuning.plausibility)
+        reason = reason_implausible(candidate, values, observed, exact=exact, tuning=tuning.plausibility)
         if len(coefficients) == 1 and abs(coefficients[0]) <= wide.factor * np.sqrt(covariance[0, 0]):
             reason = reason or "its size may be zero"
         if reason is not None:
@@ -193,14 +191,12 @@ def reason_implausible(
     values: tuple[ParameterValue, ...],
     observed: Observed,
     *,
-    known: bool,
     exact: bool,
     tuning: PlausibilityTuning,
 ) -> str | None:
     """Why these parameters are not believed, in a few words; None where they are.
 
-    known: whether the evidence is overwhelming, so that a parameter may be outside its plausible range. exact: whether
-    the model leaves nothing structured, so that a shift may be shorter than a sampling interval.
+    exact: whether the model leaves nothing structured, so that a shift may be shorter than a sampling interval.
     """
     facts = {each.name: each for each in candidate.facts.parameters}
     kind: Kind = getattr(candidate, "kind", "revolute")
@@ -210,7 +206,7 @@ def reason_implausible(
             continue
         reason = None if exact else _reason_below_sampling(parameter, each.value, observed)
         reason = reason or _reason_unknown(parameter, each, tuning)
-        reason = reason or (None if known else _reason_out_of_range(parameter, each, kind))
+        reason = reason or _reason_out_of_range(parameter, each, kind)
         if reason is not None:
             return reason
     return None

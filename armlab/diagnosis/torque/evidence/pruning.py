@@ -96,11 +96,6 @@ def _search_again(belief: Belief, fixed: bool) -> Belief:
     return replace(belief, model=replace(model, state=state, steps=tuple(steps)))
 
 
-def test_again(belief: Belief) -> Belief:
-    """The belief without what no longer passes, see `withdraw`."""
-    return withdraw(belief, {})
-
-
 def withdraw(belief: Belief, failed: Mapping[int, FailedTest], before: frozenset[int] = frozenset()) -> Belief:
     """The belief without some groups, and without what no longer passes; usual friction in the place of special laws.
 
@@ -109,7 +104,7 @@ def withdraw(belief: Belief, failed: Mapping[int, FailedTest], before: frozenset
     model = belief.model
     judge, groups = Judge(model, model.state), frozenset(failed)
     steps = [Step.against(model.candidate(group), test) for group, test in failed.items()]
-    back = {other for group in groups for other in judge.in_place_of(group)}
+    back = {other for group in groups for other in judge.simpler(group)}
     state = State(tuple(sorted(set(model.state.groups) - groups | back)), model.state.widths)
     less = belief.with_state(state, *steps)
     return _settle_links(_remove_failing(replace(less, banned=groups | before | other_bodies(model))))
@@ -172,7 +167,7 @@ def prefer_one_body(belief: Belief) -> Belief:
     """
     held = hold_body(belief.model)
     if held is not belief.model:
-        tested = test_again(replace(belief, model=held))
+        tested = withdraw(replace(belief, model=held), {})
         belief = tested if payload_groups(tested.model) else belief
     failed = FailedTest("bodies that can exist", "no body has such a mass, centre and inertia")
     impossible = dict.fromkeys(impossible_bodies(belief.model), failed)
@@ -209,7 +204,7 @@ def _remove_failing(belief: Belief) -> Belief:
         steps += [Step.against(model.candidate(group), bad.get(group, bad[weakest])) for group in gone]
         places = {groups[group].place for group in gone}
         banned |= {number for number, each in enumerate(groups) if each.place in places}
-        back = {other for group in gone for other in judge.in_place_of(group)}
+        back = {other for group in gone for other in judge.simpler(group)}
         state = State(tuple(sorted(set(state.groups) - gone | back)), state.widths)
         model = replace(model, state=state, steps=tuple(steps))
 

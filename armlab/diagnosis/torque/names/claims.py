@@ -45,8 +45,7 @@ def make_claims(
     ]
     claims += _link_claims(model, wide, links, names.links)
     known = list(dict.fromkeys(group.candidate.facts for group in model.solver.groups))
-    most = model.design.settings.tuning.naming.max_class - 1
-    claims = [_with_equal_sums(claim, claims, known, most) for claim in claims]
+    claims = [_with_equal_sums(claim, claims, known) for claim in claims]
     return tuple(sorted(claims, key=lambda claim: -claim.evidence.score))
 
 
@@ -55,10 +54,10 @@ def next_experiment(effect: Effect, rivals: Sequence[Rival]) -> str | None:
     return effect.experiment or None if rivals else None
 
 
-def _with_equal_sums(claim: Claim, claims: Sequence[Claim], known: Sequence[Effect], most: int) -> Claim:
+def _with_equal_sums(claim: Claim, claims: Sequence[Claim], known: Sequence[Effect]) -> Claim:
     """The claim with effects as rivals that equal its sum with another claim at its joint, for any motion.
 
-    What not every arm has keeps its name: the rival stands beside the usual part of the sum. most: rivals of a claim.
+    What not every arm has keeps its name: the rival stands beside the usual part of the sum.
     """
     here = {other.effect for other in claims if other.joint == claim.joint}
     equal = [each for each in known if any(claim.effect in pair and set(pair) <= here for pair in each.equal_sums)]
@@ -66,7 +65,7 @@ def _with_equal_sums(claim: Claim, claims: Sequence[Claim], known: Sequence[Effe
         return claim
     names = {each.id for each in equal}
     sums = [Rival(each.id, claim.joint, claim.joints, True) for each in equal]
-    rivals = (*sums, *(each for each in claim.rivals if each.effect not in names))[:most]
+    rivals = (*sums, *(each for each in claim.rivals if each.effect not in names))
     return replace(claim, rivals=rivals, next_experiment=next_experiment(claim.candidate.facts, rivals))
 
 

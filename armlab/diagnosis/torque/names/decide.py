@@ -21,7 +21,9 @@ from armlab.effects.library import effect_named
 
 CALIBRATION_FILE: Final = "calibration.json"
 LIMIT_FILE: Final = "unknown_limit.json"
+MIN_NAME_PROBABILITY: Final = 0.9  # of a name that is stated, and of all names of a class together
 MIN_CAUSE_PROBABILITY: Final = 0.5  # of a cause that is stated without its law
+MAX_CLASS_NAMES: Final = 3
 MOTION_AXES: Final = ("velocity", "position", "acceleration")
 
 
@@ -72,7 +74,7 @@ class Naming:
     def members(self, tuning: NamingTuning) -> tuple[Member, ...]:
         """What is left open: the class, or what an unknown may be; empty for one name."""
         if self.is_unknown:
-            return tuple(each for each in self.answers[: tuning.max_class] if each.probability >= tuning.shown)
+            return tuple(each for each in self.answers[:MAX_CLASS_NAMES] if each.probability >= tuning.shown)
         return self.claimed if len(self.claimed) > 1 else ()
 
 
@@ -91,14 +93,15 @@ def naming_of(weighed: Weighed, settings: Settings) -> Naming:
 def _naming(weighed: Iterable[Member], settings: Settings) -> Naming:
     tuning = settings.tuning.naming
     answers = tuple(sorted(weighed, key=lambda each: -each.probability))
-    enough = np.flatnonzero(np.cumsum([each.probability for each in answers])[: tuning.max_class] >= tuning.level)
+    likeliest = np.cumsum([each.probability for each in answers[:MAX_CLASS_NAMES]])
+    enough = np.flatnonzero(likeliest >= MIN_NAME_PROBABILITY)
     together = answers[: enough[0] + 1] if len(enough) else ()
     names = [each.probability for each in answers if each.effect != UNKNOWN.id]
     named = sum(each.probability for each in together if each.effect != UNKNOWN.id)
     return Naming(
         answers,
         claimed=together if named >= tuning.least_names else (),
-        sure=sum(names[: tuning.max_class]) >= tuning.level,
+        sure=sum(names[:MAX_CLASS_NAMES]) >= MIN_NAME_PROBABILITY,
     )
 
 
@@ -126,12 +129,12 @@ def named_claims(claims: Sequence[Claim], settings: Settings, plain: Collection[
 
 def lost_names(before: Sequence[Claim], after: Sequence[Claim], settings: Settings) -> Iterator[Step]:
     """For the log: which laws of claims are not told by their name. before, after: without and with probabilities."""
-    told, least = {(each.effect, each.joint) for each in after}, settings.tuning.naming.level
+    told = {(each.effect, each.joint) for each in after}
     for claim in before:
         if claim.candidate is not None and (claim.effect, claim.joint) not in told:
             chance = naming_of(claim.weighed, settings).probability_of(claim.effect, claim.joint)
             text = f"its probability is {chance:.2g}"
-            failed = FailedTest("probability of the name", text, chance, least, "naming.level")
+            failed = FailedTest("probability of the name", text, chance, MIN_NAME_PROBABILITY)
             yield replace(Step.against(claim.candidate, failed, "told without its name"), stage=named_claims.__name__)
 
 
@@ -162,14 +165,14 @@ def _named(claim: Claim, settings: Settings, plain: Collection[int]) -> Claim:
     if claim.effect == UNKNOWN.id or (nameless and not keeps_law):
         return _without_name(claim, naming, tuning)
     chance = sum(naming.probability_of(*each) for each in own)
-    members = (naming.members(tuning) or naming.claimed) if chance < tuning.level else ()
+    members = (naming.members(tuning) or naming.claimed) if chance < MIN_NAME_PROBABILITY else ()
     others = [each for each in members if each.effect != UNKNOWN.id and not each.is_of(claim.effect, claim.joint)]
     rivals = [*identical, *(each.as_rival for each in others if (each.effect, each.joint) not in known)]
     return replace(
         claim,
         probability=chance,
         members=members,
-        rivals=tuple(rivals[: tuning.max_class - 1]),
+        rivals=tuple(rivals[: MAX_CLASS_NAMES - 1]),
         next_experiment=next_experiment(effect_named(claim.effect), rivals),
     )
 
@@ -227,7 +230,7 @@ def _without_name(claim: Claim, naming: Naming, tuning: NamingTuning) -> Claim:
         group=None,
         unnamed=() if claim.group is None else (claim.group,),
         probability=naming.probability_of(UNKNOWN.id, joint),
-        members=tuple(each for each in naming.answers[: tuning.max_class] if each.probability >= tuning.shown),
+        members=tuple(each for each in naming.answers[:MAX_CLASS_NAMES] if each.probability >= tuning.shown),
     )
 
 

@@ -9,13 +9,11 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from armlab.diagnosis.result import Claim, Member, Part
-from armlab.diagnosis.torque.names.decide import MIN_CAUSE_PROBABILITY
+from armlab.diagnosis.torque.names.decide import MAX_CLASS_NAMES, MIN_CAUSE_PROBABILITY, MIN_NAME_PROBABILITY
 from armlab.diagnosis.torque.predict.parts import UNKNOWN_CAUSE, cause_of
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 
-MIN_NAME_PROBABILITY = 0.9  # of a name, and of all names of a class together
-MAX_CLASS_NAMES = 3
 FRICTION = "friction"
 STATED_SHARE = 0.95  # of the error: causes are told until they explain as much
 MAX_STATED_CAUSES = 4

@@ -10,6 +10,7 @@ from armlab.diagnosis.torque.columns.blocks import BlockCovariance, block_covari
 from armlab.diagnosis.torque.search.fitted_model import FittedModel
 from armlab.diagnosis.torque.search.refine import prior_precision
 
+CONFIDENCE = 0.95  # of the intervals that a verdict calls ci95
 SHAPE_STEP = 1e-4  # of the way between a shape's bounds, for derivatives
 
 
@@ -28,8 +29,8 @@ class ShapedFit:
     @property
     def factor(self) -> float:
         """From a standard error to half an interval."""
-        tuning = self.model.design.settings.tuning.intervals
-        return tuning.factor * student_quantile((1 + tuning.confidence) / 2, self.spread.degrees)
+        factor = self.model.design.settings.tuning.intervals.factor
+        return factor * student_quantile((1 + CONFIDENCE) / 2, self.spread.degrees)
 
     def covariance(self, group: int) -> Array:
         """Of a group's coefficients and shapes, unscaled, (coefficients + shapes,) squared."""

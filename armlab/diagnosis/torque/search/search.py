@@ -148,7 +148,7 @@ class Search:
     def excluded(self, state: State, group: int) -> bool:
         """Whether a group is not looked for: see `has_no_room`.
 
-        A law of the last resort is nowhere looked for beside the others: see `find_friction_curves`.
+        A law of the last resort is nowhere looked for beside the others: see `name_friction_curves`.
         """
         return self.solver.candidate(group).facts.last_resort or self.has_no_room(state, group)
 
