@@ -12,8 +12,10 @@
 
 /* Compiled for processors with AVX-512, with AVX2 and with neither, whichever runs it: the operations and their results
  * are the same. */
-#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 12 /* knows v4 */
 #define SEVERAL_PROCESSORS __attribute__((target_clones("arch=x86-64-v4", "avx2", "default")))
+#elif defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
+#define SEVERAL_PROCESSORS __attribute__((target_clones("avx2", "default")))
 #else
 #define SEVERAL_PROCESSORS
 #endif
