@@ -10,11 +10,8 @@
 
 #define LEAST_MASS 0.5 /* of an inertia: what a negative payload leaves of it */
 
-/* Compiled for processors with AVX-512, with AVX2 and with neither, whichever runs it: the operations and their results
- * are the same. */
-#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 12 /* knows v4 */
-#define SEVERAL_PROCESSORS __attribute__((target_clones("arch=x86-64-v4", "avx2", "default")))
-#elif defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
+/* Compiled for processors with and without AVX2, whichever runs it: the operations and their results are the same. */
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
 #define SEVERAL_PROCESSORS __attribute__((target_clones("avx2", "default")))
 #else
 #define SEVERAL_PROCESSORS
@@ -91,8 +88,11 @@ static void integrate_runs(const Stretch *at, const Servo *servo, double *integr
 }
 
 /* A vector of numbers, and a mask with all bits of a number set or none (extensions of GCC and Clang). */
-typedef double Vector __attribute__((vector_size(8 * LANES)));
-typedef int64_t Mask __attribute__((vector_size(8 * LANES)));
+typedef double Vector __attribute__((vector_size(32)));
+typedef int64_t Mask __attribute__((vector_size(32)));
+#define WIDTH 4
+#define PARTS (LANES / WIDTH)
+#define EACH_PART for (int part = 0; part < PARTS; part++)
 
 INLINE Vector choose(Mask mask, Vector yes, Vector no) {
     return (Vector)((mask & (Mask)yes) | (~mask & (Mask)no));
@@ -100,13 +100,6 @@ INLINE Vector choose(Mask mask, Vector yes, Vector no) {
 
 INLINE Vector clip_each(Vector value, Vector bound) {
     return choose(value > bound, bound, choose(value < -bound, -bound, value));
-}
-
-INLINE int any_of(Mask mask) {
-    int64_t any = 0;
-    for (int lane = 0; lane < LANES; lane++)
-        any |= mask[lane];
-    return any != 0;
 }
 
 INLINE Vector size_of(Vector value) { return choose(value < 0, -value, value); }
@@ -125,26 +118,15 @@ INLINE Vector clip_torque(Vector torque, Vector velocity, Vector limit, Vector w
     return clip_each(torque, choose(torque * velocity > 0, working, limit));
 }
 
-/* Of numbers that are not positive, to 1e-13 of the value: 2^n of the nearest n, and the series of what is left. It is
- * the same on every processor. */
-INLINE Vector exponential(Vector power) {
-    const Vector none = {0}, least = none - 700.0;
-    const Vector clipped = choose(power > least, power, least), whole = clipped * (1 / M_LN2) + ROUNDS;
-    const Vector x = clipped - (whole - ROUNDS) * M_LN2, square = x * x, fourth = square * square;
-    const Vector first = (1.0 + x) + (1.0 / 2 + x * (1.0 / 6)) * square;
-    const Vector second = (1.0 / 24 + x * (1.0 / 120)) + (1.0 / 720 + x * (1.0 / 5040)) * square;
-    const Vector third = (1.0 / 40320 + x * (1.0 / 362880)) + (1.0 / 3628800 + x * (1.0 / 39916800)) * square;
-    return (Vector)((Mask)(first + (second + third * fourth) * fourth) + ((Mask)whole << 52));
-}
-
 /* The level of friction at a velocity, without that of the load. */
 INLINE Vector level_at(const Servo *servo, Vector velocity) {
     Vector level = {0};
     level += servo->friction;
-    if (servo->static_excess > 0) {
-        const Vector slip = velocity / servo->stribeck_speed;
-        level += servo->static_excess * exponential(-slip * slip);
-    }
+    if (servo->static_excess > 0)
+        for (int lane = 0; lane < WIDTH; lane++) {
+            const double slip = velocity[lane] / servo->stribeck_speed;
+            level[lane] += servo->static_excess * exp(-slip * slip);
+        }
     return level;
 }
 
@@ -155,74 +137,46 @@ INLINE Vector left_of(const Servo *servo, Vector error, Vector band) {
 
 INLINE int64_t column_at(int64_t column, int64_t last) { return column < 0 ? 0 : column < last ? column : last; }
 
-/* LANES windows of one joint that are replayed at once: a processor computes several in one instruction. Each table has
- * the numbers of all lanes at a step side by side, (steps, LANES); command: (columns, LANES). */
+/* Column `step` of LANES rows of a table, each from its place on. */
+INLINE void take(const double *table, const int64_t from[LANES], int64_t step, Vector out[PARTS]) {
+    EACH_PART {
+        const int64_t *own = from + part * WIDTH;
+        const double *at = table + step;
+        out[part] = (Vector){at[own[0]], at[own[1]], at[own[2]], at[own[3]]};
+    }
+}
+
+/* LANES windows of one joint that are replayed at once: a processor computes several in one instruction. */
 typedef struct {
-    const double *command, *measured, *inertia, *load, *slope, *supply, *unit_inertia, *unit_load, *unit_slope;
-    const int64_t *window;
-} Lanes; /* TABLES beside the commands */
+    int64_t from[LANES], commands[LANES], own[LANES]; /* places of their first step, first command, and own number */
+} Lanes;
 
-/* The first `taken` columns of the rows of a table that belong to windows, (taken, LANES), in `room`; where they end, the
- * room of the next table. */
-static double *lay_side_by_side(const double *table, int64_t columns, int64_t taken, const int64_t window[LANES],
-    double *room) {
-    for (int64_t column = 0; column < taken; column++)
-        for (int lane = 0; lane < LANES; lane++)
-            room[column * LANES + lane] = table[window[lane] * columns + column];
-    return room + taken * LANES;
-}
-
-/* Windows for the first `steps` steps. room: (columns + TABLES steps, LANES). loaded: whether a servo has a payload. */
-static Lanes lanes_of(const Stretch *at, const int64_t window[LANES], int64_t steps, int loaded, double *room) {
-    const int64_t taken = steps < at->steps ? steps + 1 : steps; /* the next measured position is in each step */
-    const double *own[TABLES] = {at->measured, at->inertia, at->load, at->slope, at->supply,
-        loaded ? at->unit_inertia : 0, loaded ? at->unit_load : 0, loaded ? at->unit_slope : 0};
-    const double *laid[TABLES] = {0}, *commands = room;
-    room = lay_side_by_side(at->command, at->columns, at->columns, window, room);
-    for (int table = 0; table < TABLES; table++)
-        if (own[table]) {
-            laid[table] = room;
-            room = lay_side_by_side(own[table], at->steps, taken, window, room);
-        }
-    return (Lanes){commands, laid[0], laid[1], laid[2], laid[3], laid[4], laid[5], laid[6], laid[7], window};
-}
-
-/* A row of a table of Lanes. */
-INLINE Vector take(const double *table, int64_t row) {
-    Vector taken;
-    memcpy(&taken, table + row * LANES, sizeof taken);
-    return taken;
-}
-
-/* The own number of each window, (windows), of the lanes. */
-INLINE Vector take_own(const double *table, const Lanes *lanes) {
-    Vector taken;
-    for (int lane = 0; lane < LANES; lane++)
-        taken[lane] = table[lanes->window[lane]];
-    return taken;
+INLINE Lanes lanes_of(const Stretch *at, const int64_t window[LANES]) {
+    Lanes lanes;
+    for (int lane = 0; lane < LANES; lane++) {
+        lanes.from[lane] = window[lane] * at->steps;
+        lanes.commands[lane] = window[lane] * at->columns;
+        lanes.own[lane] = window[lane];
+    }
+    return lanes;
 }
 
 /* At the beginning of a step. passed: the measured position there; earlier, thrust: the command and the torque that
  * accelerated the link in the step before. */
 typedef struct {
-    Vector position, velocity, integral, passed, earlier, thrust;
+    Vector position[PARTS], velocity[PARTS], integral[PARTS], passed[PARTS], earlier[PARTS], thrust[PARTS];
 } State;
 
 INLINE State first_state(const Stretch *at, const Lanes *lanes, const Servo *servo, const double *integrals) {
     const int64_t last = at->columns - 1, before = (int64_t)floor((double)at->history - servo->delay / at->step) - 1;
     State state;
-    state.position = take(lanes->measured, 0);
-    state.passed = take(lanes->measured, 0);
-    state.velocity = take_own(at->first_velocity, lanes);
-    state.integral = take_own(integrals, lanes);
-    state.earlier = take(lanes->command, column_at(before, last));
-    state.thrust = (Vector){0};
+    take(at->measured, lanes->from, 0, state.position);
+    take(at->measured, lanes->from, 0, state.passed);
+    take(at->first_velocity, lanes->own, 0, state.velocity);
+    take(integrals, lanes->own, 0, state.integral);
+    take(at->command, lanes->commands, column_at(before, last), state.earlier);
+    memset(state.thrust, 0, sizeof state.thrust);
     return state;
-}
-
-/* The velocity after half a step, if the link keeps its acceleration. mass: with the rotor. */
-INLINE Vector middle_velocity(const Servo *servo, const State *state, Vector mass, double half) {
-    return state->velocity + half * state->thrust / (mass - servo->armature);
 }
 
 /* One step of a joint. pushed: torque by the accelerations of other joints beside the load.
@@ -230,89 +184,114 @@ INLINE Vector middle_velocity(const Servo *servo, const State *state, Vector mas
  * The torque limit acts on the command before its change within a step and on that after it, which are the means of the
  * steps around it: a limit on the torque of the mean command would cut too little, and a fit would find it too low. */
 INLINE void advance(const Stretch *at, const Lanes *lanes, int64_t step, const Servo *servo,
-    const Vector pushed, State *state) {
+    const Vector pushed[PARTS], State *state) {
     const double h = at->step, half = 0.5 * h, gain = servo->kp - servo->ki_speed;
     const Vector none = {0}, full = none + 1.0, widest = none + servo->limit, band = none + 0.5 * servo->dead_band;
     const Vector wound_up = none + servo->integral_limit;
     const int64_t last = at->columns - 1;
+    Vector before[PARTS], after[PARTS], mass[PARTS], load[PARTS], slope[PARTS], next[PARTS], supply[PARTS];
+    Vector free[PARTS], slow[PARTS], torque[PARTS], later[PARTS], asked[PARTS], away[PARTS], error[PARTS];
+    Vector speed[PARTS], working[PARTS];
     const double place = (double)(at->history + step) - servo->delay / h, whole = floor(place), share = place - whole;
     const int64_t row = (int64_t)whole;
-    const Vector before = take(lanes->command, column_at(row, last));
-    const Vector after = take(lanes->command, row < 0 ? 0 : column_at(row + 1, last));
-    const Vector later = share > 0 ? take(lanes->command, column_at(row + 2, last)) : after;
-    const Vector next = take(lanes->measured, step + 1 < at->steps ? step + 1 : step);
-    const Vector supply = lanes->supply ? take(lanes->supply, step) : full;
-    Vector mass = take(lanes->inertia, step) + servo->armature;
-    Vector load = take(lanes->load, step) + pushed, slope = take(lanes->slope, step);
+    take(at->command, lanes->commands, column_at(row, last), before);
+    take(at->command, lanes->commands, row < 0 ? 0 : column_at(row + 1, last), after);
+    if (share > 0)
+        take(at->command, lanes->commands, column_at(row + 2, last), later);
+    else
+        EACH_PART later[part] = after[part];
+    take(at->inertia, lanes->from, step, mass);
+    take(at->load, lanes->from, step, load);
+    take(at->slope, lanes->from, step, slope);
+    take(at->measured, lanes->from, step + 1 < at->steps ? step + 1 : step, next);
+    EACH_PART {
+        mass[part] += servo->armature;
+        load[part] += pushed[part];
+    }
     if (servo->payload != 0) {
-        const Vector least = LEAST_MASS * mass, loaded = mass + servo->payload * take(lanes->unit_inertia, step);
-        mass = choose(loaded > least, loaded, least);
-        load += servo->payload * take(lanes->unit_load, step);
-        slope += servo->payload * take(lanes->unit_slope, step);
+        Vector unit_mass[PARTS], unit_load[PARTS], unit_slope[PARTS];
+        take(at->unit_inertia, lanes->from, step, unit_mass);
+        take(at->unit_load, lanes->from, step, unit_load);
+        take(at->unit_slope, lanes->from, step, unit_slope);
+        EACH_PART {
+            const Vector least = LEAST_MASS * mass[part], loaded = mass[part] + servo->payload * unit_mass[part];
+            mass[part] = choose(loaded > least, loaded, least);
+            load[part] += servo->payload * unit_load[part];
+            slope[part] += servo->payload * unit_slope[part];
+        }
     }
-    const Vector velocity = state->velocity, earlier = state->earlier, middle = state->position + half * velocity;
-    load += slope * (middle - 0.5 * (state->passed + next));
-    state->passed = next;
-    const Vector away = servo->offset - read_position(at, middle), asked = before + share * (after - before);
-    const Vector error = left_of(servo, asked + away, band);
-    Vector pull = gain * error;
-    if (servo->ki > 0) {
-        const Vector more = half * (servo->ki * error - servo->ki_speed * velocity);
-        pull += clip_each(state->integral + more, wound_up);
+    EACH_PART supply[part] = full;
+    if (at->supply)
+        take(at->supply, lanes->from, step, supply);
+    Mask beyond = {0};
+    EACH_PART {
+        const Vector velocity = state->velocity[part], middle = state->position[part] + half * velocity;
+        load[part] += slope[part] * (middle - 0.5 * (state->passed[part] + next[part]));
+        state->passed[part] = next[part];
+        away[part] = servo->offset - read_position(at, middle);
+        asked[part] = before[part] + share * (after[part] - before[part]);
+        error[part] = left_of(servo, asked[part] + away[part], band);
+        Vector pull = gain * error[part];
+        if (servo->ki > 0) {
+            const Vector more = half * (servo->ki * error[part] - servo->ki_speed * velocity);
+            pull += clip_each(state->integral[part] + more, wound_up);
+        }
+        slow[part] = half * (servo->damping + supply[part] * servo->kd);
+        free[part] = (mass[part] - slow[part]) * velocity + h * (supply[part] * pull - load[part]);
+        free[part] /= mass[part] + slow[part];
+        torque[part] = pull - 0.5 * servo->kd * (velocity + free[part]);
+        speed[part] = velocity + half * state->thrust[part] / (mass[part] - servo->armature);
+        working[part] = widest - servo->limit_slope * size_of(speed[part]);
+        working[part] = choose(working[part] > 0, working[part], none);
+        beyond |= size_of(torque[part]) + gain * size_of(later[part] - state->earlier[part]) > working[part];
     }
-    Vector slow = half * (servo->damping + supply * servo->kd);
-    Vector free = (mass - slow) * velocity + h * (supply * pull - load);
-    free /= mass + slow;
-    const Vector torque = pull - 0.5 * servo->kd * (velocity + free);
-    Vector working = widest;
-    if (servo->limit_slope != 0) {
-        working -= servo->limit_slope * size_of(middle_velocity(servo, state, mass, half));
-        working = choose(working > 0, working, none);
+    if (beyond[0] | beyond[1] | beyond[2] | beyond[3])
+        EACH_PART {
+            const Vector earlier = state->earlier[part];
+            const Vector done = (asked[part] - earlier) / (later[part] - earlier);
+            const Vector rest = torque[part] - gain * error[part];
+            const Mask changes = (done > 0) & (done < 1);
+            const Vector old = choose(changes, earlier, asked[part]);
+            const Vector new = choose(changes, later[part], asked[part]);
+            const Vector first = rest + gain * left_of(servo, old + away[part], band);
+            const Vector second = rest + gain * left_of(servo, new + away[part], band);
+            const Vector begun = clip_torque(first, speed[part], widest, working[part]);
+            const Vector ended = clip_torque(second, speed[part], widest, working[part]);
+            const Mask over = (first != begun) | (second != ended);
+            const Vector held = supply[part] * (begun + choose(changes, done, none) * (ended - begun));
+            const Vector outside = none + half * servo->damping;
+            const Vector driven = (mass[part] - outside) * state->velocity[part] + h * (held - load[part]);
+            free[part] = choose(over, driven / (mass[part] + outside), free[part]);
+            slow[part] = choose(over, outside, slow[part]);
+        }
+    EACH_PART {
+        const Vector carried = size_of(load[part] + state->thrust[part]), before_step = state->velocity[part];
+        const Vector friction = level_at(servo, before_step) + servo->load_friction * carried;
+        const Vector moved = state->position[part] + half * before_step;
+        state->velocity[part] = free[part] - clip_each(free[part], h * friction / (mass[part] + slow[part]));
+        if (servo->ki > 0) {
+            const Vector mean = 0.5 * (before_step + state->velocity[part]);
+            const Vector more = h * (servo->ki * error[part] - servo->ki_speed * mean);
+            state->integral[part] = clip_each(state->integral[part] + more, wound_up);
+        }
+        state->position[part] = moved + half * state->velocity[part];
+        state->thrust[part] = (mass[part] - servo->armature) * (state->velocity[part] - before_step) / h;
+        state->earlier[part] = before[part];
     }
-    if (any_of(size_of(torque) + gain * size_of(later - earlier) > working)) {
-        const Vector done = (asked - earlier) / (later - earlier), rest = torque - gain * error;
-        const Mask changes = (done > 0) & (done < 1);
-        const Vector old = choose(changes, earlier, asked), new = choose(changes, later, asked);
-        const Vector first = rest + gain * left_of(servo, old + away, band);
-        const Vector second = rest + gain * left_of(servo, new + away, band);
-        const Vector speed = middle_velocity(servo, state, mass, half);
-        const Vector begun = clip_torque(first, speed, widest, working);
-        const Vector ended = clip_torque(second, speed, widest, working);
-        const Mask over = (first != begun) | (second != ended);
-        const Vector held = supply * (begun + choose(changes, done, none) * (ended - begun));
-        const Vector outside = none + half * servo->damping;
-        const Vector driven = (mass - outside) * velocity + h * (held - load);
-        free = choose(over, driven / (mass + outside), free);
-        slow = choose(over, outside, slow);
-    }
-    const Vector friction = level_at(servo, velocity) + servo->load_friction * size_of(load + state->thrust);
-    state->velocity = free - clip_each(free, h * friction / (mass + slow));
-    if (servo->ki > 0) {
-        const Vector mean = 0.5 * (velocity + state->velocity);
-        const Vector more = h * (servo->ki * error - servo->ki_speed * mean);
-        state->integral = clip_each(state->integral + more, wound_up);
-    }
-    state->position = middle + half * state->velocity;
-    state->thrust = (mass - servo->armature) * (state->velocity - velocity) / h;
-    state->earlier = before;
 }
 
-/* Positions of a joint at the beginning of each step, (steps + 1, LANES) of each group. The groups take turns in each
- * step: a processor works at one while another waits for a result. */
+/* Positions of a joint at the beginning of each step, (steps + 1, LANES). */
 SEVERAL_PROCESSORS
-static void replay_groups(const Stretch *at, const Lanes lanes[GROUPS], int64_t steps, const Servo *servo,
+static void replay_lanes(const Stretch *at, const int64_t window[LANES], int64_t steps, const Servo *servo,
     const double *integrals, double *path) {
-    const Vector nothing = {0};
-    const int64_t size = (steps + 1) * LANES;
-    State states[GROUPS];
-    for (int group = 0; group < GROUPS; group++)
-        states[group] = first_state(at, lanes + group, servo, integrals);
-    for (int64_t step = 0; step <= steps; step++)
-        for (int group = 0; group < GROUPS; group++) {
-            memcpy(path + group * size + step * LANES, &states[group].position, sizeof(Vector));
-            if (step < steps)
-                advance(at, lanes + group, step, servo, nothing, states + group);
-        }
+    const Vector nothing[PARTS] = {{0}};
+    const Lanes lanes = lanes_of(at, window);
+    State state = first_state(at, &lanes, servo, integrals);
+    for (int64_t step = 0; step < steps; step++) {
+        memcpy(path + step * LANES, state.position, sizeof state.position);
+        advance(at, &lanes, step, servo, nothing, &state);
+    }
+    memcpy(path + steps * LANES, state.position, sizeof state.position);
 }
 
 #define MOST_SWEEPS 200
@@ -320,7 +299,7 @@ static void replay_groups(const Stretch *at, const Lanes lanes[GROUPS], int64_t 
 #define FARTHEST 1e6       /* rad (m): a joint that would go farther is there */
 
 /* One step of all joints that push each other: a step of one joint after the other with the accelerations of the others
- * (Gauss-Seidel), which converges because a mass matrix is positive definite. mass: (joints, joints). */
+ * (Gauss-Seidel), which converges because a mass matrix is positive definite. mass: (joints, joints) of each part. */
 INLINE void advance_arm(const Stretch *at, const Lanes *lanes, int64_t step, int64_t joints, const Servo *servos,
     const Vector *mass, const Vector *moves, State *states, Vector *accelerations) {
     const double h = at->step;
@@ -328,35 +307,42 @@ INLINE void advance_arm(const Stretch *at, const Lanes *lanes, int64_t step, int
     for (int sweep = 0; sweep < MOST_SWEEPS; sweep++) {
         Mask changed = {0};
         for (int64_t joint = 0; joint < joints; joint++) {
-            Vector pushed = {0};
+            Vector pushed[PARTS] = {{0}};
             for (int64_t other = 0; other < joints; other++)
                 if (other != joint)
-                    pushed += mass[joint * joints + other] * accelerations[other];
+                    EACH_PART pushed[part] += mass[(joint * joints + other) * PARTS + part] *
+                        accelerations[other * PARTS + part];
             next[joint] = states[joint];
-            advance(at + joint, lanes + joint, step, servos + joint, pushed, next + joint);
-            const Vector change = moves[joint] * (next[joint].velocity - states[joint].velocity);
-            changed |= size_of(change - h * accelerations[joint]) > SAME_VELOCITY;
-            accelerations[joint] = change / h;
+            advance(at + joint, lanes, step, servos + joint, pushed, next + joint);
+            EACH_PART {
+                Vector *own = accelerations + joint * PARTS + part;
+                const Vector turned = next[joint].velocity[part] - states[joint].velocity[part];
+                const Vector change = moves[joint * PARTS + part] * turned;
+                changed |= size_of(change - h * *own) > SAME_VELOCITY;
+                *own = change / h;
+            }
         }
-        if (!any_of(changed))
+        if (!(changed[0] | changed[1] | changed[2] | changed[3]))
             break;
     }
     for (int64_t joint = 0; joint < joints; joint++) {
-        const Vector none = {0}, farthest = none + FARTHEST;
-        const Mask near = size_of(next[joint].position) < FARTHEST, goes = moves[joint] != 0;
-        next[joint].position = choose(near, next[joint].position, farthest);
-        next[joint].velocity = choose(near & goes, next[joint].velocity, none);
-        next[joint].position = choose(goes, next[joint].position, states[joint].position);
+        EACH_PART {
+            const Vector none = {0}, farthest = none + FARTHEST;
+            const Mask near = size_of(next[joint].position[part]) < FARTHEST, goes = moves[joint * PARTS + part] != 0;
+            next[joint].position[part] = choose(near, next[joint].position[part], farthest);
+            next[joint].velocity[part] = choose(near & goes, next[joint].velocity[part], none);
+            next[joint].position[part] = choose(goes, next[joint].position[part], states[joint].position[part]);
+        }
         states[joint] = next[joint];
     }
 }
 
 /* The next LANES windows, or the last one again; how many they are. */
 static int next_windows(int64_t windows, int64_t first, int64_t window[LANES]) {
-    const int64_t left = windows > first ? windows - first : 0;
+    const int lanes = windows - first < LANES ? (int)(windows - first) : LANES;
     for (int lane = 0; lane < LANES; lane++)
-        window[lane] = lane < left ? first + lane : windows - 1;
-    return left < LANES ? (int)left : LANES;
+        window[lane] = first + (lane < lanes ? lane : lanes - 1);
+    return lanes;
 }
 
 static void start_integrals(const Stretch *at, const Servo *servo, double *integrals) {
@@ -366,44 +352,27 @@ static void start_integrals(const Stretch *at, const Servo *servo, double *integ
         integrate_runs(at, servo, integrals);
 }
 
-/* Whether one of servos has a payload. */
-static int any_loaded(int64_t count, const Servo *servos) {
-    for (int64_t each = 0; each < count; each++)
-        if (servos[each].payload != 0)
-            return 1;
-    return 0;
-}
-
 /* servos: (sets). out: (sets, samples), simulated positions; integrals: (sets, windows), room for those of the sets;
- * room: (GROUPS, columns + (TABLES + 1) steps + 1, LANES). */
-void replay_joint(const Stretch *at, int64_t sets, const Servo *servos, double *integrals, double *room, double *out) {
-    const int64_t samples = at->begin[at->windows], size = (at->columns + TABLES * at->steps) * LANES;
-    const int loaded = any_loaded(sets, servos);
-    double *path = room + GROUPS * size;
+ * path: (steps + 1, LANES), room for positions. */
+void replay_joint(const Stretch *at, int64_t sets, const Servo *servos, double *integrals, double *path, double *out) {
+    const int64_t samples = at->begin[at->windows];
     for (int64_t set = 0; set < sets; set++)
         start_integrals(at, servos + set, integrals + set * at->windows);
-    for (int64_t first = 0; first < at->windows; first += GROUPS * LANES) {
-        const int64_t end = first + GROUPS * LANES < at->windows ? first + GROUPS * LANES : at->windows;
-        int64_t window[GROUPS][LANES], steps = 0;
-        for (int64_t each = first; each < end; each++) {
-            const int64_t last = at->begin[each + 1] - 1;
-            if (last >= at->begin[each] && at->row[last] >= steps)
-                steps = at->row[last] + 1;
-        }
-        Lanes lanes[GROUPS];
-        for (int group = 0; group < GROUPS; group++) {
-            next_windows(at->windows, first + group * LANES, window[group]);
-            lanes[group] = lanes_of(at, window[group], steps, loaded, room + group * size);
+    for (int64_t first = 0; first < at->windows; first += LANES) {
+        int64_t window[LANES], steps = 0;
+        const int lanes = next_windows(at->windows, first, window);
+        for (int lane = 0; lane < LANES; lane++) {
+            int64_t end = at->begin[window[lane] + 1];
+            if (end > at->begin[window[lane]] && at->row[end - 1] >= steps)
+                steps = at->row[end - 1] + 1;
         }
         for (int64_t set = 0; set < sets; set++) {
-            replay_groups(at, lanes, steps, servos + set, integrals + set * at->windows, path);
-            for (int64_t each = first; each < end; each++) {
-                const double *own = path + (each - first) / LANES * (steps + 1) * LANES + (each - first) % LANES;
-                for (int64_t sample = at->begin[each]; sample < at->begin[each + 1]; sample++) {
-                    const double *before = own + at->row[sample] * LANES;
+            replay_lanes(at, window, steps, servos + set, integrals + set * at->windows, path);
+            for (int lane = 0; lane < lanes; lane++)
+                for (int64_t sample = at->begin[window[lane]]; sample < at->begin[window[lane] + 1]; sample++) {
+                    const double *before = path + at->row[sample] * LANES + lane;
                     out[set * samples + sample] = before[0] + at->fraction[sample] * (before[LANES] - before[0]);
                 }
-            }
         }
     }
 }
@@ -411,17 +380,15 @@ void replay_joint(const Stretch *at, int64_t sets, const Servo *servos, double *
 /* All joints of LANES windows. As in replay_arm. */
 SEVERAL_PROCESSORS
 static void replay_arm_lanes(int64_t joints, const Stretch *at, const Servo *servos, const MassTable *table,
-    const int64_t window[LANES], int count, const double *integrals, double *room, double *position, double *velocity) {
+    const int64_t window[LANES], int count, const double *integrals, double *position, double *velocity) {
     const int64_t steps = at->steps, windows = at->windows, square = joints * joints;
-    const int loaded = any_loaded(joints, servos);
-    Lanes lanes[MOST_JOINTS];
+    const Lanes lanes = lanes_of(at, window);
     State states[MOST_JOINTS];
-    Vector mass[MOST_JOINTS * MOST_JOINTS], moves[MOST_JOINTS], accelerations[MOST_JOINTS] = {{0}};
+    Vector mass[MOST_JOINTS * MOST_JOINTS * PARTS], moves[MOST_JOINTS * PARTS], accelerations[MOST_JOINTS * PARTS] = {{0}};
     for (int64_t joint = 0; joint < joints; joint++) {
-        lanes[joint] = lanes_of(at + joint, window, steps, loaded, room + joint * LANES * (at->columns + TABLES * steps));
-        states[joint] = first_state(at + joint, lanes + joint, servos + joint, integrals + joint * windows);
+        states[joint] = first_state(at + joint, &lanes, servos + joint, integrals + joint * windows);
         for (int lane = 0; lane < LANES; lane++)
-            moves[joint][lane] = table->moves[window[lane] * joints + joint];
+            ((double *)(moves + joint * PARTS))[lane] = table->moves[window[lane] * joints + joint];
     }
     for (int64_t step = 0; step < steps; step++) {
         const int64_t row = step / table->every;
@@ -429,27 +396,27 @@ static void replay_arm_lanes(int64_t joints, const Stretch *at, const Servo *ser
         for (int64_t entry = 0; entry < square; entry++)
             for (int lane = 0; lane < LANES; lane++) {
                 const double *before = table->mass + (window[lane] * table->rows + row) * square + entry;
-                mass[entry][lane] = before[0] + share * (before[square] - before[0]);
+                ((double *)(mass + entry * PARTS))[lane] = before[0] + share * (before[square] - before[0]);
             }
         for (int64_t joint = 0; joint < joints; joint++)
             for (int lane = 0; lane < count; lane++) {
                 const int64_t place = (joint * windows + window[lane]) * steps + step;
-                position[place] = states[joint].position[lane];
-                velocity[place] = states[joint].velocity[lane];
+                position[place] = ((double *)states[joint].position)[lane];
+                velocity[place] = ((double *)states[joint].velocity)[lane];
             }
-        advance_arm(at, lanes, step, joints, servos, mass, moves, states, accelerations);
+        advance_arm(at, &lanes, step, joints, servos, mass, moves, states, accelerations);
     }
 }
 
 /* servos, at: (joints). position, velocity: (joints, windows, steps), at the beginning of each step; integrals: (joints,
- * windows), room for those of the drives; room: (joints, columns + TABLES steps, LANES). */
+ * windows), room for those of the drives. */
 void replay_arm(int64_t joints, const Stretch *at, const Servo *servos, const MassTable *table, double *integrals,
-    double *room, double *position, double *velocity) {
+    double *position, double *velocity) {
     for (int64_t joint = 0; joint < joints; joint++)
         start_integrals(at + joint, servos + joint, integrals + joint * at->windows);
     for (int64_t first = 0; first < at->windows; first += LANES) {
         int64_t window[LANES];
         const int lanes = next_windows(at->windows, first, window);
-        replay_arm_lanes(joints, at, servos, table, window, lanes, integrals, room, position, velocity);
+        replay_arm_lanes(joints, at, servos, table, window, lanes, integrals, position, velocity);
     }
 }

@@ -71,8 +71,8 @@ def replay_joint(windows: Windows, values: Array, reads_steps: bool = False) -> 
     if reads_steps:
         stretch.encoder_step, stretch.encoder_phase = windows.encoder_step, windows.encoder_phase
     integrals = ffi.new("double[]", len(servos) * windows.count)
-    room = _room(lib.GROUPS * (windows.command.shape[1] + (lib.TABLES + 1) * windows.measured.shape[1] + 1))
-    places = (ffi.from_buffer("Servo[]", servos), integrals, room, ffi.from_buffer("double[]", out))
+    path = ffi.from_buffer("double[]", np.empty((windows.measured.shape[1] + 1, lib.LANES)))
+    places = (ffi.from_buffer("Servo[]", servos), integrals, path, ffi.from_buffer("double[]", out))
     lib.replay_joint(stretch, len(servos), *places)
     return out
 
@@ -96,8 +96,7 @@ def replay_arm(
     table.rows, table.every = mass.shape[1], every
     table.mass, table.moves = (ffi.from_buffer("double[]", each) for each in kept)
     integrals = ffi.new("double[]", len(windows) * count)
-    room = _room(len(windows) * (windows[0].command.shape[1] + lib.TABLES * steps))
-    places = (room, ffi.from_buffer("double[]", position), ffi.from_buffer("double[]", velocity))
+    places = (ffi.from_buffer("double[]", position), ffi.from_buffer("double[]", velocity))
     lib.replay_arm(len(windows), stretches, ffi.from_buffer("Servo[]", servos), table, integrals, *places)
     return position, velocity
 
@@ -110,11 +109,6 @@ def _stable_servos(windows: Windows, servos: Array) -> Array:
     stiffest = MAX_STEP_PHASE * (windows.inertia.min() + servos[:, place("armature")]) / windows.step_s**2
     servos[:, place("kp")] = np.minimum(servos[:, place("kp")], stiffest)
     return servos
-
-
-def _room(rows: int) -> Any:
-    """Numbers of all lanes side by side, (rows, LANES), as C takes them."""
-    return ffi.from_buffer("double[]", np.empty((rows, lib.LANES)))
 
 
 def _point_to(stretch: Any, windows: Windows) -> None:

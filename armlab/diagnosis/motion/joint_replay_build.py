@@ -4,9 +4,7 @@ from pathlib import Path
 
 import cffi
 
-LANES = 4  # windows that are computed in one instruction
-GROUPS = 2  # of as many windows, that are replayed at once
-TABLES = 8  # of a window, beside its commands
+LANES = 8  # windows that are replayed at once
 MOST_JOINTS = 16  # of an arm whose joints are replayed together
 
 DECLARED = """
@@ -22,18 +20,17 @@ typedef struct {
     const int64_t *begin, *row, *run, *start;
     const double *fraction;
 } Stretch;
-void replay_joint(const Stretch *at, int64_t sets, const Servo *servos, double *integrals, double *room,
+void replay_joint(const Stretch *at, int64_t sets, const Servo *servos, double *integrals, double *path,
     double *out);
 typedef struct {
     int64_t rows, every;
     const double *mass, *moves;
 } MassTable;
 void replay_arm(int64_t joints, const Stretch *at, const Servo *servos, const MassTable *table, double *integrals,
-    double *room, double *position, double *velocity);
+    double *position, double *velocity);
 """
 
-NUMBERS = {"LANES": LANES, "GROUPS": GROUPS, "TABLES": TABLES, "MOST_JOINTS": MOST_JOINTS}
-DEFINED = "".join(f"#define {name} {number}\n" for name, number in NUMBERS.items())
+DEFINED = f"#define LANES {LANES}\n#define MOST_JOINTS {MOST_JOINTS}\n"
 ffibuilder = cffi.FFI()
 ffibuilder.cdef(DEFINED + DECLARED)
 ffibuilder.set_source(
