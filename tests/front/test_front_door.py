@@ -14,7 +14,6 @@ from click.testing import CliRunner
 
 import armlab
 from armlab.cli.main import main
-from armlab.diagnosis.result import Diagnosis
 from armlab.recordings.recording import Recording
 from problem.robot_file import load_arm
 
@@ -162,11 +161,11 @@ def test_objects_say_what_they_are_in_a_few_lines(recording, model):
 
 
 def test_a_comparison_names_effects_with_their_places(recording):
-    found = Diagnosis(recording, None, "mismatch")
+    pair, changes = (recording, recording), (SimpleNamespace(changed=True),)
     named = (SimpleNamespace(effect="coulomb_friction", joint=2, equation="tau_2 += 0.4"),)
-    compared = armlab.Comparison("changed", (found, found), named, (SimpleNamespace(changed=True),))
+    compared = armlab.Comparison("changed", pair, None, findings=named, changes=changes)
     assert "  coulomb_friction@2: tau_2 += 0.4\n  parameters compared: 1" in repr(compared)
-    assert repr(armlab.Comparison("inconclusive", (found, found), reason="Too short.")).endswith(
+    assert repr(armlab.Comparison("inconclusive", pair, None, reason="Too short.")).endswith(
         "inconclusive\n  Too short."
     )
 

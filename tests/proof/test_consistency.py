@@ -80,7 +80,7 @@ def test_what_is_taken_away_costs_what_a_fit_of_all_others_leaves() -> None:
     for own in (columns, np.concatenate([columns, *(model.solver.groups[each].columns for each in groups)])):
         values = np.zeros(model.moments.size)
         values[own] = np.linalg.lstsq(gram[np.ix_(own, own)], gram[own, -1])[0] / model.moments.lengths[own]
-        residual = model.columns.matrices[1][:, -1] - model.columns.torque_at(1, values)
+        residual = model.columns.target_at(1) - model.columns.torque_at(1, values)
         errors.append(float(np.sqrt(np.mean(residual[design.observed.rows_held_out(1)] ** 2))))
     assert expected.joint == 1
     assert expected.growth == pytest.approx(errors[0] / errors[1] - 1, rel=0.02)
