@@ -13,10 +13,10 @@ from armlab.proof.blind.pairs.field_pairs import write_field_pair
 from armlab.proof.blind.pairs.pair_cases import known_differences
 from armlab.proof.blind.pairs.pair_plan import CHANGE_KINDS, PAIRS, DriftingNoise, PairPlan, draw_change, draw_pair
 from armlab.proof.blind.pairs.pair_score import (
-    BLIND,
+    BROKEN_YARDSTICK,
     COVERED,
     FALSE,
-    NO_YARDSTICK,
+    MISSED,
     RIGHT,
     PairOutcome,
     count_names,
@@ -104,13 +104,13 @@ def test_changes_that_are_too_small_do_not_count() -> None:
 
 def test_the_same_is_wrong_where_plain_least_squares_sees_a_change() -> None:
     blind, good = outcome("gain", plain=9.0), outcome("gain", plain=9.0, status="changed")
-    assert counts(blind, good, outcome("gain"), outcome("gain", plain=None))[BLIND] == (1, 2)
+    assert counts(blind, good, outcome("gain"), outcome("gain", plain=None))[MISSED] == (1, 2)
 
 
 def test_a_yardstick_that_sees_a_change_where_there_is_none_is_said() -> None:
     false = outcome("null", tier="field", wrong=1)
     found = counts(outcome("null", plain=9.0), false, outcome("null", plain=None))
-    assert (found[NO_YARDSTICK], found[f"{NO_YARDSTICK}, field"], found[FALSE]) == ((1, 2), (0, 1), (1, 3))
+    assert (found[BROKEN_YARDSTICK], found[f"{BROKEN_YARDSTICK}, field"], found[FALSE]) == ((1, 2), (0, 1), (1, 3))
 
 
 def test_intervals_are_judged_where_the_number_is_named_and_known() -> None:

@@ -30,10 +30,8 @@ from problem.regressor import rigid_body_torque
 LOADS = ("inertia", "load", "slope", "unit_inertia", "unit_load", "unit_slope")
 SLOPE_STEP = 1e-3  # rad (m), of the central difference
 SAME_POSITION = 1e-6  # rad (m): rounding of one step of an encoder
-COPPER, RATED_TEMPERATURE = (
-    234.5,
-    25.0,
-)  # degrees Celsius: of copper below which it would have no resistance; of a data sheet
+COPPER_OFFSET = 234.5  # degrees Celsius: the resistance of copper grows with the temperature plus this (IEC 60034-1)
+RATED_TEMPERATURE = 25.0  # degrees Celsius, of a data sheet
 
 
 @dataclass(frozen=True, eq=False)
@@ -304,7 +302,7 @@ def supply_factor(run: MotionRun, joint: int, time: Array, supply: float | None)
         return None
     factor = _sensor(run.voltage, joint) / supply
     if run.temperature is not None:
-        factor = factor * (COPPER + RATED_TEMPERATURE) / (COPPER + _sensor(run.temperature, joint))
+        factor = factor * (COPPER_OFFSET + RATED_TEMPERATURE) / (COPPER_OFFSET + _sensor(run.temperature, joint))
     return np.asarray(np.interp(time, run.time, factor))
 
 

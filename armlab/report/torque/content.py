@@ -100,7 +100,7 @@ def cause_table(diagnosis: Diagnosis) -> Table | None:
     rows = []
     for each in told:
         own = account.findings_of(each)
-        place = cause_place(diagnosis, each, own) or _place_of_all(diagnosis, each, own)
+        place = cause_place(diagnosis, each, own) or _place_of_whole_arm(diagnosis, each, own)
         share, size = format_share(each.share), _cause_size(diagnosis, each)
         rows.append([cause_name(each, own), place, size, share, _how_sure(own)])
     if open_share(account) > 1 - STATED_SHARE:
@@ -108,12 +108,12 @@ def cause_table(diagnosis: Diagnosis) -> Table | None:
     return Table(["cause", "where", "how large", "of the error", "how sure"], rows, (0, 1, 2, 4), stacked=True)
 
 
-def _place_of_all(diagnosis: Diagnosis, cause: StatedCause, own: Sequence[StatedFinding]) -> str:
-    """Of a cause without a place of its own: links are missed most at one, which need not be the one that is off."""
+def _place_of_whole_arm(diagnosis: Diagnosis, cause: StatedCause, own: Sequence[StatedFinding]) -> str:
+    """Where a cause without joints acts. Links that are off show most at one link, which may be right itself."""
     joint = own[0].claim.joint
     if cause.cause != LINKS or joint is None:
         return "the whole arm"
-    return f"missed most at {links_in_words(diagnosis.simulation.arm, [joint])}, which is off is not certain"
+    return f"missed most at {links_in_words(diagnosis.simulation.arm, [joint])}, these data do not tell which is off"
 
 
 def _cause_size(diagnosis: Diagnosis, cause: StatedCause) -> str:

@@ -29,9 +29,9 @@ from armlab.recordings.plain_least_squares import SEEN_ERRORS, compare_plain_fol
 MAX_CLASS = 3  # names
 FALSE, RIGHT, WRONG = "nothing changed, something named", "right name or class of three", "wrong names among all names"
 COVERED = "intervals that hold the truth"
-BLIND = f'"same" where plain least squares sees more than {SEEN_ERRORS:g} standard errors'
-NO_YARDSTICK = f"nothing changed, plain least squares sees more than {SEEN_ERRORS:g} standard errors"
-WANTED = {FALSE: "at most 2%", RIGHT: "at least 95%", COVERED: "90% to 98%", BLIND: "none", NO_YARDSTICK: "none"}
+MISSED = f'"same" where plain least squares sees more than {SEEN_ERRORS:g} standard errors'
+BROKEN_YARDSTICK = f"nothing changed, plain least squares sees more than {SEEN_ERRORS:g} standard errors"
+WANTED = {FALSE: "at most 2%", RIGHT: "at least 95%", COVERED: "90% to 98%", MISSED: "none", BROKEN_YARDSTICK: "none"}
 
 
 @dataclass(frozen=True)
@@ -174,9 +174,9 @@ def _measure_plainly(outcomes: Sequence[PairOutcome], name: str) -> Iterator[Sha
     nulls = [each for each in outcomes if each.kind == "null" and each.plain is not None]
     seen = [each for each in outcomes if each.kind != "null" and each.is_seen_plainly]
     if seen:
-        yield Share(f"{BLIND}{name}", sum(each.status == "same" for each in seen), len(seen))
+        yield Share(f"{MISSED}{name}", sum(each.status == "same" for each in seen), len(seen))
     if nulls:
-        yield Share(f"{NO_YARDSTICK}{name}", sum(each.is_seen_plainly for each in nulls), len(nulls))
+        yield Share(f"{BROKEN_YARDSTICK}{name}", sum(each.is_seen_plainly for each in nulls), len(nulls))
 
 
 def score_page(outcomes: Sequence[PairOutcome], measures: Sequence[Share]) -> str:
