@@ -470,10 +470,10 @@ class PlausibilityTuning:
         source="development sets: 12 for a right finding; an interval of 94 % of the value to both sides has it",
         least=1.0,
     )
-    max_unknown_ratio: float = tuned(
+    max_unknown_share: float = tuned(
         0.5,
-        "structure without a name beside which that link or load is known",
-        "of the rms torque of a link or load at a joint",
+        "what structure without a name could be of a link or load that is known",
+        "of the torque of the link or load",
         source="the KUKA's single runs: where an unnamed spring is as large, the load is off by half",
     )
 

@@ -112,28 +112,30 @@ def test_what_no_body_can_be_is_an_error_of_the_link_and_no_payload(tmp_path: Pa
 def reason_beside(joint: int, size: float, depends_on: tuple[str, ...], link: int = 3) -> str | None:
     """Why a body at a link is not told, that joint 2 shows best and joint 1 does not feel. joint: of structure, from 1.
 
-    size: of the structure, N m; that of the body is 10 at joint 2 and 5 at joint 3.
+    size: of the structure, N m; that of the body is 10 at joint 2 and 5 at joint 3, each with a noise of 1 N m.
     """
     torque = np.sin(np.linspace(0, 20, 500))[:, None] * [1e-14, 10.0, 5.0]
     evidence = Evidence(1, 0.0, 0.0, 0.9, 0.0, 0.9, 9.0, 1.0, 500.0)
     load = Claim("payload", link, (link,), (), "", evidence, torque, candidate=SolidBody.of_body(ARM, link, BODY))
     left = Structure(joint - 1, 0.9, 1e-9, 0.9, 0.9, size * np.cos(np.linspace(0, 20, 500)), depends_on)
-    return reason_link_unknown(load, [left], Tuning())
+    return reason_link_unknown(load, [left], np.ones(3), Tuning())
 
 
-def test_a_load_is_not_told_beside_structure_as_large_as_its_own_torque() -> None:
-    assert reason_beside(2, 4.0, ("position_2",)) is None
-    assert "joint 2" in str(reason_beside(2, 6.0, ("position_2",)))
-    assert "joint 3" in str(reason_beside(3, 3.0, ("acceleration_3", "velocity_3")))
-    assert "joint 3" in str(reason_beside(3, 3.0, ()))
+def test_a_load_is_not_told_beside_structure_that_could_be_half_of_it() -> None:
+    """Joint 2 tells four fifths of the load and joint 3 a fifth."""
+    assert reason_beside(2, 5.0, ("position_2",)) is None
+    assert "joint 2" in str(reason_beside(2, 7.0, ("position_2",)))
+    assert reason_beside(3, 5.0, ("position_3",)) is None
+    assert "joint 3" in str(reason_beside(3, 13.0, ("acceleration_3", "velocity_3")))
+    assert "joint 3" in str(reason_beside(3, 13.0, ()))
     assert reason_beside(1, 6.0, ("position_1",)) is None
 
 
 def test_friction_of_a_joint_that_a_load_hardly_moves_says_nothing_of_the_load() -> None:
     """At the joint that shows the load best it does, whatever it depends on."""
-    assert reason_beside(3, 3.0, ("velocity_3", "torque_3")) is None
-    assert reason_beside(3, 3.0, ("velocity_2",)) is not None
-    assert reason_beside(2, 6.0, ("velocity_2",)) is not None
+    assert reason_beside(3, 13.0, ("velocity_3", "torque_3")) is None
+    assert reason_beside(3, 13.0, ("velocity_2",)) is not None
+    assert reason_beside(2, 7.0, ("velocity_2",)) is not None
 
 
 def test_structure_beyond_a_link_may_be_of_a_body_that_a_later_link_carries() -> None:

@@ -5,11 +5,12 @@ with other numbers stands for structure that the library lacks. An interval that
 or a whole circle is no knowledge of a parameter.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.result import Claim
 from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.evidence.added_body import mass_found_anew
@@ -28,7 +29,7 @@ from armlab.effects.parameters import ParameterValue, parameter_values
 
 NOT_CLAIMED = "present, not claimed"
 CONTRADICTED = FailedTest("what is left at the joint", "what is left at its joint is no less structured")
-ROUNDING = 1e-9  # of a link's torque at the joint that shows it best: a joint with less does not feel it
+SMALLEST_TORQUE = 1e-12  # N m; less is rounding
 
 
 def withdraw_implausible(belief: Belief) -> Belief:
@@ -123,42 +124,47 @@ def links_that_data_tell(
     """The claims without those on a link or a load of which these data do not tell; the log says why not.
 
     No parameter of a link that is off differs from zero, and it is not certain that the link is off. Or structure is
-    left without a name that is comparable with what the claim explains: at the joint that shows the claim best, or,
-    unless it is of the friction there, at another joint that feels the link; at a joint beyond the link any is, because
-    a later link may carry what was found. Or a load has another mass where it is found anew beside all that is named.
-    left: what is structured beyond chance.
+    left without a name that could be much of what the claim explains; structure of the friction of a joint speaks of
+    links at the joint alone that shows the claim best; at a joint beyond the link any structure speaks against it,
+    because a later link may carry what was found. Or a load has another mass where it is found anew beside all that is
+    named. left: what is structured beyond chance.
     """
-    kept, steps = [], list(model.steps)
-    for each in claims:
-        reason = reason_link_unknown(each, left, model.design.settings.tuning)
-        reason = reason or _reason_other_mass(model, each)
+    kept, steps, noise = [], list(model.steps), model.residual(model.fit)
+    for each in left:
+        noise[:, each.joint] -= each.prediction
+    size = np.maximum(np.std(noise, axis=0), SMALLEST_TORQUE)
+    for claim in claims:
+        reason = reason_link_unknown(claim, left, size, model.design.settings.tuning)
+        reason = reason or _reason_other_mass(model, claim)
         if reason is None:
-            kept.append(each)
+            kept.append(claim)
         else:
             failed = FailedTest("links of which these data tell", reason)
-            steps.append(Step(f"{NOT_CLAIMED}: {each.effect} {each.joint}: {reason}", 0.0, failed))
+            steps.append(Step(f"{NOT_CLAIMED}: {claim.effect} {claim.joint}: {reason}", 0.0, failed))
     return replace(model, steps=tuple(steps)), tuple(kept)
 
 
-def reason_link_unknown(claim: Claim, left: Sequence[Structure], tuning: Tuning) -> str | None:
-    """Why these data do not tell of a claim about a link or its load; None where they do, and for other claims."""
+def reason_link_unknown(claim: Claim, left: Sequence[Structure], noise: Array, tuning: Tuning) -> str | None:
+    """Why these data do not tell of a claim about a link or its load; None where they do, and for other claims.
+
+    noise: (joints,), N m, what is left at each joint beside structure: a joint tells of the claim by the square of the
+    torque that it feels over that. Structure can be taken for so much of the claim at most as it is of that torque,
+    times the joint's share in all that joints tell.
+    """
     if claim.candidate is None or claim.candidate.facts.where != "link":
         return None
     if claim.in_links and claim.evidence.score < tuning.pruning.least_evidence and not _differs_from_zero(claim):
         return "no parameter differs from zero"
-    best, link = claim.evidence.joint, claim.candidate.joints[0]
+    felt, link = np.std(claim.prediction, axis=0) / noise, claim.candidate.joints[0]
     for each in left:
-        if each.joint != best and _is_of_friction(each):
+        if each.joint != claim.evidence.joint and _is_of_friction(each):
             continue
         if each.joint >= link:
             return f"what is left without a name at joint {each.joint + 1} may be of a body that a later link carries"
-        own, unknown = (float(np.std(of)) for of in (claim.prediction[:, each.joint], each.prediction))
-        is_felt = own > ROUNDING * float(np.std(claim.prediction[:, best]))
-        if is_felt and unknown > tuning.plausibility.max_unknown_ratio * own:
-            share = format(unknown / own, ".2g")
-            return (
-                f"what is left without a name at joint {each.joint + 1} is {share} times as large as its torque there"
-            )
+        unnamed = float(np.std(each.prediction) / noise[each.joint])
+        share = float(unnamed * felt[each.joint] / (felt @ felt))
+        if share > tuning.plausibility.max_unknown_share:
+            return f"what is left without a name at joint {each.joint + 1} could be {share:.2g} of it"
     return None
 
 
@@ -198,18 +204,29 @@ def reason_implausible(
 
     exact: whether the model leaves nothing structured, so that a shift may be shorter than a sampling interval.
     """
-    facts = {each.name: each for each in candidate.facts.parameters}
-    kind: Kind = getattr(candidate, "kind", "revolute")
-    for each in values:
-        parameter = facts.get(each.name)
-        if parameter is None or isinstance(each.value, tuple):
-            continue
-        reason = None if exact else _reason_below_sampling(parameter, each.value, observed)
+    for parameter, each, value in _known_scalars(candidate, values):
+        reason = None if exact else _reason_below_sampling(parameter, value, observed)
         reason = reason or _reason_unknown(parameter, each, tuning)
-        reason = reason or _reason_out_of_range(parameter, each, kind)
+        reason = reason or _reason_out_of_range(parameter, each, candidate)
         if reason is not None:
             return reason
     return None
+
+
+def is_of_no_arm(candidate: Candidate, values: tuple[ParameterValue, ...]) -> bool:
+    """Whether a parameter is outside what arms have, its whole interval."""
+    known = _known_scalars(candidate, values)
+    return any(_reason_out_of_range(parameter, each, candidate) is not None for parameter, each, _ in known)
+
+
+def _known_scalars(
+    candidate: Candidate, values: tuple[ParameterValue, ...]
+) -> Iterator[tuple[Parameter, ParameterValue, float]]:
+    """Scalars that the effect names: the parameter, and its value with and without an interval."""
+    facts = {each.name: each for each in candidate.facts.parameters}
+    for each in values:
+        if each.name in facts and not isinstance(each.value, tuple):
+            yield facts[each.name], each, each.value
 
 
 def _reason_below_sampling(parameter: Parameter, value: float, observed: Observed) -> str | None:
@@ -237,10 +254,11 @@ def _reason_unknown(parameter: Parameter, each: ParameterValue, tuning: Plausibi
     return None
 
 
-def _reason_out_of_range(parameter: Parameter, each: ParameterValue, kind: Kind) -> str | None:
+def _reason_out_of_range(parameter: Parameter, each: ParameterValue, candidate: Candidate) -> str | None:
     """A parameter whose whole interval is outside what arms have."""
     if parameter.plausible is None or isinstance(each.value, tuple):
         return None
+    kind: Kind = getattr(candidate, "kind", "revolute")
     lowest, highest = parameter.plausible.limits(kind)
     low, high = _interval(each) or (each.value, each.value)
     if high >= lowest and low <= highest:
