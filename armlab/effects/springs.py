@@ -15,6 +15,7 @@ from armlab.effects.contract import (
     Candidate,
     Effect,
     Parameter,
+    Range,
     Scene,
     Value,
 )
@@ -30,6 +31,12 @@ from armlab.effects.term import (
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
+
+RESTS_SEEN = Range(
+    (-2 * np.pi, 2 * np.pi),
+    "no joint of an arm turns further; a torque that vanishes there alone is constant",
+    (-5.0, 5.0),
+)
 
 TORQUE_RIPPLE_FACTS = Effect(
     "torque_ripple",
@@ -64,7 +71,7 @@ GRAVITY_COMPENSATOR_FACTS = Effect(
 CABLE_STIFFNESS_FACTS = Effect(
     "cable_stiffness",
     "hoses and cables that pull the joint to a rest position",
-    (STIFFNESS, Parameter("rest", ANGLE)),
+    (STIFFNESS, Parameter("rest", ANGLE, plausible=RESTS_SEEN)),
     law=r"\Delta\tau_j = \text{stiffness} \; (q_j - \text{rest})",
     contains=("torque_offset",),
     axis="position",

@@ -164,7 +164,7 @@ def _named(claim: Claim, settings: Settings, plain: Collection[int]) -> Claim:
     keeps_law = likeliest or (usual and claim.evidence.joint + 1 in plain) or _is_friction_for_sure(claim, naming)
     if claim.effect == UNKNOWN.id or (nameless and not keeps_law):
         return _without_name(claim, naming, tuning)
-    chance = sum(naming.probability_of(*each) for each in own)
+    chance = min(sum(naming.probability_of(*each) for each in own), 1.0)
     members = (naming.members(tuning) or naming.claimed) if chance < MIN_NAME_PROBABILITY else ()
     others = [each for each in members if each.effect != UNKNOWN.id and not each.is_of(claim.effect, claim.joint)]
     rivals = [*identical, *(each.as_rival for each in others if (each.effect, each.joint) not in known)]

@@ -1,12 +1,14 @@
 """What speaks for each name that a finding could have, and for none of them: the numbers behind its probabilities.
 
-Every candidate of the library takes the place of the finding in turn, everything else fitted anew. What its law lacks
-of the best log evidence, and what it predicts worse, speaks against a name. That none is right is likelier the more
-structure is left beside the finding, the better a flexible law does in its place, and the more is unusual about its
-joint. It is likelier, too, where the errors of the model are coloured, for they are then more than noise, and where a
-finding explains less of the validation runs. Three kinds of findings are weighed, each with numbers of its own: what
-passed all tests (`found`), what would still raise the log evidence (`left`), and structure of which only a surrogate
-knows (`structure`).
+Every candidate of the library takes the place of the finding in turn, everything else fitted anew. One that predicts
+held-out rows worse than no law in that place, or that needs numbers that no arm has, is no name. What a law lacks of
+the best log evidence, and what it predicts worse than the finding, speaks against a name. That none is right is
+likelier the more structure is left beside the finding, the better a flexible law does in its place, and the more is
+unusual about its joint. It is likelier, too, where the errors of the model are coloured, for they are then more than
+noise, and where a finding explains less of the validation runs.
+
+Three kinds of findings are weighed, each with numbers of its own: what passed all tests (`found`), what would still
+raise the log evidence (`left`), and structure of which only a surrogate knows (`structure`).
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -19,9 +21,10 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.result import Weighed, WeighedName
 from armlab.diagnosis.torque.columns.blocks import rows_of_fit
 from armlab.diagnosis.torque.columns.links import Widths
-from armlab.diagnosis.torque.columns.solver import Fit, State
+from armlab.diagnosis.torque.columns.solver import Fit, Solver, State
 from armlab.diagnosis.torque.evidence.added_body import PlacedBody, payload_groups, place_body
 from armlab.diagnosis.torque.evidence.evidence import Evidence
+from armlab.diagnosis.torque.evidence.plausibility import is_of_no_arm
 from armlab.diagnosis.torque.evidence.unknown import flexible_gain, is_structured, predicted_share
 from armlab.diagnosis.torque.search.fitted_model import FittedModel
 from armlab.diagnosis.torque.search.search import Search
@@ -29,6 +32,8 @@ from armlab.diagnosis.torque.search.surrogate import Structure
 from armlab.effects.contract import UNKNOWN, Candidate
 from armlab.effects.library import effect_named
 from armlab.effects.links import INERTIAL_ERROR_FACTS, PAYLOAD_FACTS
+from armlab.effects.parameters import parameter_values
+from armlab.effects.term import SIGN_SIGMAS
 
 Place = int | None  # a joint or link, from 1; None for the whole robot
 Kind = Literal["found", "left", "structure"]
@@ -39,7 +44,7 @@ MOST_COLOUR = 1.0  # of errors, a logarithm; beyond, the rate of samples says mo
 
 @dataclass(frozen=True)
 class _NameTrial:
-    """A law in the place of a finding. score: of the model with it; growth: of the held-out error by it, a share.
+    """A law in the place of a finding. score: of the model with it; error: (joints,), its `heldout_error`.
 
     own: whether the search took it. early: whether it shifts the torque of a joint that sticks to before its motion,
     as friction at rest may seem to. in_motion: what such a shift adds to the log likelihood of rows in motion.
@@ -49,7 +54,7 @@ class _NameTrial:
     joint: Place
     joints: tuple[int, ...]
     score: float
-    growth: float
+    error: Array
     own: bool = False
     early: bool = False
     in_motion: float | None = None
@@ -72,7 +77,7 @@ def weigh_effect(model: FittedModel, group: int, claimed: Mapping[int, Evidence]
         if candidate.facts.scales_torque:
             bent = _bent_gain(model, without, group)
             none["found bent"] = float(np.log1p(min(bent, MOST_BENT)))
-    return _weighed("found", trials, none, candidate.joint, candidate.joints, model, model.fit.score + bent)
+    return _weighed("found", trials, none, (candidate.joint, candidate.joints), model, without, model.fit.score + bent)
 
 
 def weigh_link(
@@ -85,13 +90,14 @@ def weigh_link(
     """The names of a link (from 0) that is off. claimed: the effects of the model."""
     widths = model.state.widths or ()
     without = State(model.state.groups, _changed(widths, link, 0.0))
-    trials = [_NameTrial(INERTIAL_ERROR_FACTS.id, link + 1, (), model.fit.score, 0.0, own=True)]
+    error = _held_out(model, model.state)
+    trials = [_NameTrial(INERTIAL_ERROR_FACTS.id, link + 1, (), model.fit.score, error, own=True)]
     trials += _in_place(model, without, None, beside=model.state)
     trials += _bodies(model, without, place_body(model, without), None)
     trials += _other_links(model, without, link, max(widths))
     none = _against_found(model, evidence, link + 1, list(claimed), left)
     none |= {"found link": 1.0, "found flexible": _flexible_ratio(model, without, evidence)}
-    return _weighed("found", trials, none, link + 1, (), model)
+    return _weighed("found", trials, none, (link + 1, ()), model, without)
 
 
 def weigh_addition(
@@ -116,7 +122,7 @@ def weigh_addition(
         "left flexible": _flexible_ratio(model, model.state, evidence),
     }
     trials = _in_place(model, model.state, group, beside=added)
-    return _weighed("left", trials, none, candidate.joint, candidate.joints, model)
+    return _weighed("left", trials, none, (candidate.joint, candidate.joints), model, model.state)
 
 
 def weigh_structure(model: FittedModel, structure: Structure, claimed: Iterable[int]) -> Weighed:
@@ -129,34 +135,41 @@ def weigh_structure(model: FittedModel, structure: Structure, claimed: Iterable[
         "structure beside": float(_unusual_at(model, joint, claimed)),
     }
     trials = _in_place(model, model.state, None, structure.joint)
-    return _weighed("structure", trials, none, joint, (joint,), model)
+    return _weighed("structure", trials, none, (joint, (joint,)), model, model.state)
 
 
 def _weighed(
     kind: Kind,
     trials: Iterable[_NameTrial],
     none: Mapping[str, float],
-    joint: Place,
-    joints: tuple[int, ...],
+    place: tuple[Place, tuple[int, ...]],
     model: FittedModel,
+    without: State,
     nameless: float = -np.inf,
 ) -> Weighed:
-    """Each name once, by its likeliest law, and none of them. nameless: the score of a law that has no name."""
-    ordered = sorted(trials, key=lambda each: (not each.own, -each.score))
+    """Each name once, by its likeliest law, and none of them.
+
+    A law that predicts held-out rows worse than the model does without any is no name, as what is found would be none.
+    place: joint and joints of the finding. without: the state with no law in that place. nameless: the score of a law
+    that has no name.
+    """
+    most, own = float(np.sum(_held_out(model, without))), _held_out(model, model.state)
     known: dict[tuple[str, Place], _NameTrial] = {}
-    for each in ordered:
-        if kind == "found" or each.score > model.fit.score:
+    for each in sorted(trials, key=lambda each: (not each.own, -each.score)):
+        predicts = each.own or float(np.sum(each.error)) <= most
+        if predicts and (kind == "found" or each.score > model.fit.score):
             known.setdefault((each.effect, each.joint), each)
     best = max((*(each.score for each in known.values()), nameless))
     names = [
-        WeighedName(each.effect, each.joint, each.joints, _for_name(kind, each, best, model.fit.score))
+        WeighedName(each.effect, each.joint, each.joints, _for_name(kind, each, best, model.fit.score, own))
         for each in known.values()
     ]
+    joint, joints = place
     return (*names, WeighedName(UNKNOWN.id, joint, joints, none))
 
 
-def _for_name(kind: Kind, trial: _NameTrial, best: float, without: float) -> dict[str, float]:
-    """best: the largest score of a trial; without: the score of a model that holds none of them."""
+def _for_name(kind: Kind, trial: _NameTrial, best: float, score: float, error: Array) -> dict[str, float]:
+    """best: the largest score of a trial; score, error: of the model that is weighed."""
     deficit = best - trial.score
     out = {
         f"is {trial.effect}": 1.0,
@@ -172,8 +185,8 @@ def _for_name(kind: Kind, trial: _NameTrial, best: float, without: float) -> dic
             "shifts in motion": float(np.log1p(max(trial.in_motion, 0.0))),
         }
     if kind == "found":
-        return out | {"found growth": min(float(np.log1p(10 * max(trial.growth, 0.0))), 3.0)}
-    return out | {f"{kind} earned": float(np.log1p(trial.score - without))}
+        return out | {"found growth": min(float(np.log1p(10 * max(_growth(trial.error, error), 0.0))), 3.0)}
+    return out | {f"{kind} earned": float(np.log1p(trial.score - score))}
 
 
 def _against_found(
@@ -276,7 +289,7 @@ def _in_place(
     beside: the state with what is weighed; what it would still raise as much is another effect, and no rival.
     """
     solver, tuning = model.solver, model.design.settings.tuning.naming
-    search, known = Search(solver, model.design.settings, True, 0), _held_out(model)
+    search = Search(solver, model.design.settings, True, 0)
     scores, seen = search.gains(without), set[tuple[str, Place]]()
     taken = None if own is None else (solver.candidate(own).effect, solver.candidate(own).joint)
     others = frozenset() if beside is None else _independent(search, scores, beside, tuning.max_independent)
@@ -295,13 +308,22 @@ def _in_place(
             continue
         seen.add(key)
         fit = solver.fit(state)
-        growth = _growth(model.moments.heldout_error(fit.coefficients), known)
         named = candidate.first_name(solver.values(fit, number), model.design.scenes)
-        trial = _NameTrial(named.effect, named.joint, named.joints, fit.score, growth, key == taken)
+        if key != taken and _is_of_no_arm(solver, fit, number, named):
+            continue
+        error = model.moments.heldout_error(fit.coefficients)
+        trial = _NameTrial(named.effect, named.joint, named.joints, fit.score, error, key == taken)
         if candidate.facts.cause == "timing" and _sticks_where_it_acts(model, state, candidate):
             early = bool(solver.values(fit, number)[0] < 0)
             trial = replace(trial, early=early, in_motion=_gain_in_motion(model, without, fit, candidate.rows))
         yield trial
+
+
+def _is_of_no_arm(solver: Solver, fit: Fit, group: int, named: Candidate) -> bool:
+    """Whether no arm has the numbers of a group, under its name, beside which nothing of it is simulated."""
+    values, covariance = solver.values(fit, group), solver.covariance(fit, group)
+    known = not solver.simulated[group].any()
+    return known and is_of_no_arm(named, parameter_values(named, values, covariance, SIGN_SIGMAS))
 
 
 def _other_friction(model: FittedModel, without: State, group: int) -> Iterator[_NameTrial]:
@@ -343,26 +365,26 @@ def _independent(search: Search, scores: Array, beside: State, share: float) -> 
 
 def _bodies(model: FittedModel, without: State, placed: Sequence[PlacedBody], own: int | None) -> Iterator[_NameTrial]:
     """A body that can exist at each link. own: the link whose body is known already."""
-    solver, known = model.solver, _held_out(model)
+    solver = model.solver
     crowd = solver.tuning.crowd_penalty * solver.crowd(without.groups)
     for each in placed:
         if each.link != own:
             score = solver.fit(without).score + each.gain - float(solver.prices[each.group]) - crowd
-            yield _NameTrial(PAYLOAD_FACTS.id, each.link, (), score, _growth(each.error, known))
+            yield _NameTrial(PAYLOAD_FACTS.id, each.link, (), score, each.error)
 
 
 def _other_links(model: FittedModel, without: State, link: int, width: float) -> Iterator[_NameTrial]:
     """Another link that is off in the place of one (from 0)."""
-    known, widths = _held_out(model), without.widths or ()
+    widths = without.widths or ()
     for other in range(len(widths)):
         if other != link:
-            fit = model.solver.fit(State(without.groups, _changed(widths, other, width)))
-            growth = _growth(model.moments.heldout_error(fit.coefficients), known)
-            yield _NameTrial(INERTIAL_ERROR_FACTS.id, other + 1, (), fit.score, growth)
+            state = State(without.groups, _changed(widths, other, width))
+            score, error = model.solver.fit(state).score, _held_out(model, state)
+            yield _NameTrial(INERTIAL_ERROR_FACTS.id, other + 1, (), score, error)
 
 
-def _held_out(model: FittedModel) -> Array:
-    return model.moments.heldout_error(model.fit.coefficients)
+def _held_out(model: FittedModel, state: State) -> Array:
+    return model.moments.heldout_error(model.solver.fit(state).coefficients)
 
 
 def _growth(error: Array, known: Array) -> float:
