@@ -22,7 +22,7 @@ from armlab.diagnosis.torque.names.additions import (
     add_probable,
     with_likeliest_names,
 )
-from armlab.diagnosis.torque.names.weighing import weigh_effect
+from armlab.diagnosis.torque.names.weighing import _is_of_no_arm, _NameTrial, _weighed, weigh_effect
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_background
 from armlab.diagnosis.torque.search.search import Search
 from armlab.effects.library import library
@@ -35,10 +35,26 @@ def spring(motion: Motion, time: Array) -> Array:
     return torque
 
 
+def spring_from(rest: float) -> cases.Hidden:
+    """A spring at joint 1, which feels no gravity, that pulls with 3 N m at zero."""
+
+    def pull(motion: Motion, time: Array) -> Array:
+        torque = np.zeros(motion.position.shape)
+        torque[:, 0] = 3.0 * (1 - motion.position[:, 0] / rest)
+        return torque
+
+    return pull
+
+
 @pytest.fixture(scope="module")
 def model() -> FittedModel:
     """A model that holds nothing, beside a hidden spring at joint 2."""
-    design = prepare(cases.recording(spring, seconds=6.0), None, Settings(), lambda message: None)
+    return model_beside(spring)
+
+
+def model_beside(hidden: cases.Hidden) -> FittedModel:
+    """A model that holds nothing, beside what is hidden."""
+    design = prepare(cases.recording(hidden, seconds=6.0), None, Settings(), lambda message: None)
     assert isinstance(design, DesignMatrix)
     fitted = fit_background(design, library(), 0, lambda message: None)
     return FittedModel(fitted.design, fitted.noise, fitted.moments, fitted.solver, State((), (0.0,) * 3))
@@ -159,3 +175,25 @@ def test_the_law_that_was_found_is_always_among_its_names(model: FittedModel, ef
     (group,) = held.state.groups
     names = weigh_effect(held, group, Judge(held, held.state).effects(), ())
     assert (effect, 2) in {(each.effect, each.joint) for each in names}
+
+
+def test_a_law_that_predicts_held_out_rows_worse_than_none_is_no_name(model: FittedModel) -> None:
+    """What was found keeps its place, and is judged by its own tests."""
+    held, without = holding(model, "cable_stiffness"), model.state
+    error = model.moments.heldout_error(model.fit.coefficients)
+    trials = [
+        _NameTrial("torque_ripple", 2, (2,), 1.0, error),
+        _NameTrial("backlash", 2, (2,), 2.0, 1.01 * error),
+        _NameTrial("cable_stiffness", 2, (2,), 1.5, 1.01 * error, own=True),
+    ]
+    names = _weighed("found", trials, {}, (2, (2,)), held, without)
+    assert {each.effect for each in names} == {"torque_ripple", "cable_stiffness", "unknown"}
+
+
+@pytest.mark.parametrize(("rest", "refused"), [(5.0, False), (30.0, True)])
+def test_a_spring_with_its_rest_where_no_joint_turns_is_no_name(rest: float, refused: bool) -> None:
+    model = model_beside(spring_from(rest))
+    places = [(each.candidate.effect, each.candidate.joint) for each in model.solver.groups]
+    spring = places.index(("cable_stiffness", 1))
+    fit = model.solver.fit(State((spring,), model.state.widths))
+    assert _is_of_no_arm(model.solver, fit, spring, model.candidate(spring)) == refused
