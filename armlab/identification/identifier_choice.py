@@ -59,7 +59,7 @@ def choose_identifier(arm: Arm, runs: Sequence[Run], cutoff_hz: float, robot: st
 
     robot: the robot file, as in `Identifier`. Raises ValueError for runs that do not fit the arm.
     """
-    held_out = HeldOutBlocks.of(runs)
+    held_out = HeldOutBlocks.of(runs).up_to(cutoff_hz)
     scored = list(_scored(arm, held_out, cutoff_hz, robot))
     best, best_scores = min(scored, key=lambda each: float(np.mean(each[1])))
     consistent = [each for each in scored if each[0].method == CONSISTENT]

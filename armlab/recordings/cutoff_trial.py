@@ -9,7 +9,7 @@ Runs that validate take no part.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from problem.motion import Motion
 BLOCKS = 6  # of all runs together, as for the model that predicts
 MIN_SAMPLES = 20  # of a run whose spectrum tells a cut-off
 MAX_ROWS = 1000  # of all runs, that a fit uses
-HARMONICS_JUDGED = 50  # of the travel: above them the torque is vibration and noise
+HARMONICS_JUDGED = 50  # of the travel, at first: above them the torque of most motions is vibration and noise
 STEP = 2.0  # from one low-pass to the next
 Predict = Callable[[int, int, slice], Array]
 
@@ -61,6 +61,14 @@ class HeldOutBlocks:
             raise DataError("the runs move too little to try cut-offs: record more motion")
         return cls(even, blocks, low_passes)
 
+    def up_to(self, highest_hz: float) -> "HeldOutBlocks":
+        """With low-passes up to a frequency, as far as the rate carries them; the same where it has them already."""
+        most = min(highest_hz, MAX_CUTOFF_SHARE * min(run.rate_hz for run in self.runs))
+        higher = self
+        while STEP * higher.low_passes_hz[0] <= most:
+            higher = replace(higher, low_passes_hz=(STEP * higher.low_passes_hz[0], *higher.low_passes_hz))
+        return higher
+
     @property
     def numbers(self) -> list[int]:
         """The blocks that hold rows to judge."""
@@ -92,10 +100,18 @@ class HeldOutBlocks:
 
 
 def choose_cutoff_hz(arm: Arm, runs: Sequence[Run]) -> float:
-    """The low-pass, Hz, behind which plain least squares predicts best. Raises ValueError for too little motion."""
+    """The low-pass, Hz, behind which plain least squares predicts best; while that is the highest, its double is tried.
+
+    Raises ValueError for too little motion.
+    """
     held_out = HeldOutBlocks.of(runs)
-    scores = [np.mean(_plain_scores(arm, held_out, each)) for each in held_out.low_passes_hz]
-    return held_out.low_passes_hz[int(np.argmin(scores))]
+    while True:
+        scores = [np.mean(_plain_scores(arm, held_out, each)) for each in held_out.low_passes_hz]
+        best = held_out.low_passes_hz[int(np.argmin(scores))]
+        higher = held_out.up_to(STEP * best)
+        if higher is held_out:
+            return best
+        held_out = higher
 
 
 def _plain_scores(arm: Arm, held_out: HeldOutBlocks, cutoff_hz: float) -> Array:

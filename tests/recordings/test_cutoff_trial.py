@@ -51,6 +51,23 @@ def test_cutoffs_are_tried_from_the_harmonics_of_the_travel_down_to_ten_periods_
     assert 10 / 12 <= tried[-1] < 2 * 10 / 12
 
 
+def test_cutoffs_go_on_upwards_as_far_as_the_rate_carries_and_no_further_than_asked() -> None:
+    tried = HeldOutBlocks.of([run_with_vibration(0.0)])
+    top = tried.low_passes_hz[0]
+    assert tried.up_to(1.9 * top) is tried
+    assert tried.up_to(2 * top).low_passes_hz == (2 * top, *tried.low_passes_hz)
+    assert tried.up_to(1e6).low_passes_hz[0] <= 0.4 * RATE_HZ < 2 * tried.up_to(1e6).low_passes_hz[0]
+
+
+def test_slow_travel_that_starts_sharply_asks_for_higher_cutoffs() -> None:
+    time = np.arange(0, 24, 1 / RATE_HZ)
+    speed = np.column_stack([np.clip(20 * np.sin(2 * np.pi * time / period), -1, 1) for period in (4.0, 3.1, 4.7)])
+    position, change = np.cumsum(speed, axis=0) / RATE_HZ, np.gradient(speed, 1 / RATE_HZ, axis=0)
+    noise = 0.05 * np.random.default_rng(0).standard_normal(speed.shape)
+    run = Run("run.csv", "identify", time, position, torque=3.0 * change + 1.5 * speed + noise)
+    assert choose_cutoff_hz(ARM, [run]) > HeldOutBlocks.of([run]).low_passes_hz[0]
+
+
 def test_a_run_that_stands_most_of_the_time_is_cut_into_blocks_that_all_move() -> None:
     moving = run_with_vibration(0.0)
     time = np.arange(0, 60, 1 / RATE_HZ)
