@@ -33,7 +33,7 @@ LOAD_SHARES_SEEN = Range((0.0, 0.5), "what gears lose: half of the torque at mos
 COULOMB_FACTS = Effect(
     "coulomb_friction",
     "constant torque against the motion",
-    (COULOMB_LEVEL,),
+    (COULOMB_LEVEL, Parameter("velocity", f"{ANGLE}/s", positive=True, detail=True)),
     law=r"\Delta\tau_j = \text{level} \; \operatorname{sgn} \dot{q}_j",
     title="Coulomb friction",
     usual=True,
@@ -202,6 +202,40 @@ class CoulombFriction(Term):
 
 
 @dataclass(frozen=True)
+class SmoothCoulombFriction(Term):
+    """level tanh(qd / velocity); shape: the velocity, rad/s (m/s).
+
+    The sign of the velocity of a joint that rests is that of the noise of its encoder. Here its friction is small.
+    """
+
+    facts = COULOMB_FACTS
+    names = ("level", "velocity")
+
+    @classmethod
+    def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
+        """None: as a candidate it would be a second name of the same law."""
+        return []
+
+    def columns(self, scene: Scene) -> Array:
+        return self._stacked(np.tanh(scene.motion.velocity[:, self.own] / self.shape[0]))
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        return {"level": float(coefficients[0]), "velocity": self.shape[0]}
+
+    def joint_fields(self, coefficients: Array) -> dict[str, float]:
+        """`frictionloss` of a simulator's joint, which has no such velocity."""
+        return {"frictionloss": float(coefficients[0])}
+
+    def equation(self, coefficients: Array) -> str:
+        level, velocity = format_number(coefficients[0]), format_number(self.shape[0])
+        return f"tau_{self.joint} += {level} tanh(qd_{self.joint} / {velocity})"
+
+    @classmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        return cls.at(arm, joints[0], shape=(float(parameters["velocity"]),)), np.array([parameters["level"]])
+
+
+@dataclass(frozen=True)
 class EarlyFriction(Term):
     """Friction at a reversal that turns before the joint does; shape: by how much at most, s.
 
@@ -292,7 +326,7 @@ def signed_power(velocity: Array, exponent: float) -> Array:
     return np.asarray(np.sign(velocity) * np.abs(velocity) ** exponent)
 
 
-COULOMB_FRICTION = EveryJoint(COULOMB_FACTS, (CoulombFriction,))
+COULOMB_FRICTION = EveryJoint(COULOMB_FACTS, (CoulombFriction, SmoothCoulombFriction))
 EARLY_FRICTION = EveryJoint(EARLY_FACTS, (EarlyFriction,))
 VISCOUS_FRICTION = EveryJoint(VISCOUS_FACTS, (ViscousFriction,))
 NONLINEAR_VISCOUS = EveryJoint(NONLINEAR_VISCOUS_FACTS, (PowerFriction,))

@@ -2,12 +2,16 @@
 
 from typing import Any
 
+import numpy as np
+
+from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate
 from armlab.effects.coupling import JointCoupling
 from armlab.effects.drive import RotorInertia, TorqueOffset
-from armlab.effects.friction import CoulombFriction, ViscousFriction
+from armlab.effects.friction import CoulombFriction, SmoothCoulombFriction, ViscousFriction
 from armlab.effects.springs import LinearSpring
 from armlab.effects.term import Term
+from armlab.recordings.plain_least_squares import COULOMB_WIDTH
 from problem.arm import Arm
 
 
@@ -22,11 +26,22 @@ def wrist_couplings(arm: Arm) -> tuple[Candidate, ...]:
     return JointCoupling.between(arm, last - 1, last), JointCoupling.between(arm, last, last - 1)
 
 
-def usual_components(arm: Arm) -> tuple[Candidate, ...]:
-    """What every real arm has (friction, rotor inertia, offset), and springs where the file of the arm has them."""
-    laws = (ViscousFriction, CoulombFriction, RotorInertia, TorqueOffset)
-    springs = tuple(LinearSpring.at(arm, joint) for joint, law in enumerate(arm.joint_laws, 1) if law.stiffness)
+def usual_components(arm: Arm, top_speed: Array | None = None) -> tuple[Candidate, ...]:
+    """What every real arm has (friction, rotor inertia, offset), and springs where the file of the arm has them.
+
+    top_speed: (joints,), rad/s (m/s); Coulomb friction turns smoothly then, by a share of it.
+    """
+    springs = (LinearSpring.at(arm, joint) for joint, law in enumerate(arm.joint_laws, 1) if law.stiffness)
+    coulomb = every_joint(arm, CoulombFriction)
+    if top_speed is not None:
+        widths = COULOMB_WIDTH * np.where(top_speed > 0, top_speed, 1.0)
+        coulomb = tuple(
+            SmoothCoulombFriction.at(arm, joint, shape=(float(width),)) for joint, width in enumerate(widths, 1)
+        )
     return (
         *springs,
-        *(part for law in laws for part in every_joint(arm, law)),
+        *every_joint(arm, ViscousFriction),
+        *coulomb,
+        *every_joint(arm, RotorInertia),
+        *every_joint(arm, TorqueOffset),
     )  # a spring takes the offset of its joint

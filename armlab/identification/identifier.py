@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate
@@ -43,6 +44,7 @@ from armlab.identification.regression import (
 from armlab.identification.selection import with_load
 from armlab.identification.structure import Structure
 from armlab.recordings.differentiate import Signals
+from armlab.recordings.plain_least_squares import PlainLayout
 from armlab.recordings.recording import Run
 from problem.arm import Arm
 
@@ -62,7 +64,8 @@ def _stack_instruments(fitted: PreparedData) -> Array:
     return np.vstack([reference_instruments(fitted[0], each) for each in fitted[1]])
 
 
-def _fastest_speeds(signals: Sequence[Signals]) -> Array:
+def fastest_speeds(signals: Sequence[Signals]) -> Array:
+    """The top speed of each joint over all runs, (joints,), rad/s (m/s)."""
     return np.asarray(np.max([np.abs(each.motion.velocity).max(axis=0) for each in signals], axis=0))
 
 
@@ -73,17 +76,30 @@ def _bayesian_estimator(fitted: PreparedData, pull: Pull, by_joint: bool = True)
     return WeightedLeastSquares() if by_joint else OrdinaryLeastSquares()
 
 
+def _plain_coordinates(structure: Structure) -> Array:
+    """Unknowns of plain least squares: each a parameter of a link, the last links first, or of a component.
+
+    Base parameters are sums over links. Directions of single bodies that a short motion hardly excites are fewer.
+    """
+    arm, links = structure.arm, len(structure.base)
+    layout = PlainLayout(arm, tuple(range(len(arm))), np.ones(len(arm)))
+    chosen = layout.columns[layout.columns < 10 * len(arm)]
+    return np.asarray(block_diag(structure.base.grouping[:, chosen], np.eye(structure.size - links)))
+
+
 METHODS: dict[str, Callable[[PreparedData, Pull], Estimator]] = {
     "ordinary": lambda fitted, pull: OrdinaryLeastSquares(),
     "alike": lambda fitted, pull: _bayesian_estimator(fitted, pull, by_joint=False),
     "weighted": _bayesian_estimator,
-    "excited": lambda fitted, pull: WeightedLeastSquares(tolerance=EXCITED_TOLERANCE),
+    "excited": lambda fitted, pull: WeightedLeastSquares(
+        tolerance=EXCITED_TOLERANCE, coordinates=_plain_coordinates(fitted[0])
+    ),
     "huber": lambda fitted, pull: RobustLeastSquares("huber"),
     "tukey": lambda fitted, pull: RobustLeastSquares("tukey"),
     "total": lambda fitted, pull: TotalLeastSquares(_draw_column_noise(fitted)),
     "likelihood": lambda fitted, pull: MaximumLikelihood(_draw_column_noise(fitted)),
     "instrumental": lambda fitted, pull: InstrumentalVariables(_stack_instruments(fitted)),
-    "physical": lambda fitted, pull: PhysicalLeastSquares(fitted[0], _fastest_speeds(fitted[1]), pull),
+    "physical": lambda fitted, pull: PhysicalLeastSquares(fitted[0], fastest_speeds(fitted[1]), pull),
 }
 
 
@@ -144,7 +160,11 @@ class Identifier:
     @property
     def manner(self) -> str:
         """Method and prior, as a reader is told."""
-        told = {"weighted": "least squares", "excited": "least squares in the directions that the motion excites"}
+        told = {
+            "weighted": "least squares",
+            "excited": "plain least squares, in the directions that the motion excites",
+            "physical": "physically consistent bodies and friction",
+        }
         prior = "" if self.pull == NO_PULL else ", drawn to the links of the robot file"
         return f"{told.get(self.method, self.method)}{prior}"
 

@@ -1,42 +1,103 @@
-"""Which estimator identifies: the one that predicts best on blocks of the runs that identify, left out in turn.
+"""Which model is identified: the one that can exist, unless another predicts better than chance has it.
 
-Least squares with every direction, without directions that the motion hardly excites, and drawn to the links of the
-robot file from afar. Short motion leaves directions open along which least squares alone goes to bodies of tons; a wide
-prior holds these where an arm can be, and what the data tell stays as it is.
+Blocks of the runs that identify are left out in turn, and what each model leaves of their torque is compared, block by
+block. Models are physically consistent, or fitted by least squares: with every direction, without those that the motion
+hardly excites, and drawn to the links of the robot file from afar. Each is tried with Coulomb friction that follows the
+sign of the velocity, and with friction that turns smoothly: a joint that rests has the sign of its encoder's noise. The
+consistent model is taken where its errors are larger than those of the best by no more than one standard error over the
+blocks (Breiman, Friedman, Olshen and Stone 1984), or by no more than a percent.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from armlab.identification.identifier import Identifier
+from armlab.common.arrays import Array
+from armlab.common.errors import InputError
+from armlab.identification.components import usual_components
+from armlab.identification.identifier import METHODS, Identifier, fastest_speeds
 from armlab.identification.priors import Pull
+from armlab.identification.torque_model import TorqueModel
+from armlab.recordings.cutoff_trial import HeldOutBlocks
 from armlab.recordings.recording import Run
 from problem.arm import Arm
+from problem.motion import Motion
 
 WIDE_TOLERANCE = 10.0  # of a prior about the robot file's links: bodies may be so many times as large
-MIN_GAIN = 0.01  # of the mean logarithm of the joints' errors: what another estimator than the first has to lower it by
+MIN_GAIN = 0.01  # of the mean logarithm of the joints' errors: less is no reason to give up consistency
+CONSISTENT = "physical"  # the method whose bodies can exist
 
 
-def choose_identifier(arm: Arm, runs: Sequence[Run], cutoff_hz: float, robot: str) -> Identifier:
-    """The usual identifier, or the best of the others where it predicts held-out blocks better by `MIN_GAIN` at least.
+@dataclass(frozen=True, eq=False)
+class IdentifierChoice:
+    """An identifier that is not fitted yet, and why it was chosen.
+
+    cost: by how much the errors of the best consistent model are larger on the blocks, a share; None where there is
+    none.
+    """
+
+    identifier: Identifier
+    cost: float | None
+
+    @property
+    def sentence(self) -> str:
+        """What is delivered and why, in a line."""
+        manner = self.identifier.manner
+        if self.identifier.method == CONSISTENT:
+            return f"{manner}: on blocks of the runs that identify, none predicts better by more than chance or 1 %"
+        if self.cost is None:
+            return f"{manner}, which predicts best on blocks of the runs that identify; no consistent model was found"
+        return (
+            f"{manner}, which predicts best on blocks of the runs that identify; there a physically consistent model "
+            f"errs {100 * self.cost:.0f} % more (--method {CONSISTENT})"
+        )
+
+
+def choose_identifier(arm: Arm, runs: Sequence[Run], cutoff_hz: float, robot: str) -> IdentifierChoice:
+    """The best identifier of an arm by blocks of runs that are left out in turn.
 
     robot: the robot file, as in `Identifier`. Raises ValueError for runs that do not fit the arm.
     """
-    usual = Identifier(arm, cutoff_hz=cutoff_hz, robot=robot)
-    first, *others = _scored([usual, replace(usual, method="excited")], runs)
-    if arm.links is not None:
-        others += _scored([replace(usual, pull=Pull("nominal", WIDE_TOLERANCE))], runs)
-    best = min(others, key=lambda each: each[0])
-    return best[1] if best[0] < first[0] - MIN_GAIN else first[1]
+    held_out = HeldOutBlocks.of(runs).up_to(cutoff_hz)
+    scored = list(_scored(arm, held_out, cutoff_hz, robot))
+    best, best_scores = min(scored, key=lambda each: float(np.mean(each[1])))
+    consistent = [each for each in scored if each[0].method == CONSISTENT]
+    if not consistent:
+        return IdentifierChoice(best, None)
+    chosen, scores = min(consistent, key=lambda each: float(np.mean(each[1])))
+    beyond = scores - best_scores
+    within = np.mean(beyond) <= max(np.std(beyond, ddof=1) / np.sqrt(len(beyond)), MIN_GAIN)
+    return IdentifierChoice(chosen if within else best, float(np.exp(np.mean(beyond)) - 1))
 
 
-def _scored(identifiers: Sequence[Identifier], runs: Sequence[Run]) -> list[tuple[float, Identifier]]:
-    """Identifiers of the same columns, each with the mean logarithm of the joints' errors on held-out blocks.
+def _scored(arm: Arm, held_out: HeldOutBlocks, cutoff_hz: float, robot: str) -> Iterator[tuple[Identifier, Array]]:
+    """Identifiers with their scores on each block, (blocks,)."""
+    usual = Identifier(arm, usual_components(arm), cutoff_hz=cutoff_hz, robot=robot)
+    top_speed = fastest_speeds(usual.prepare(held_out.runs)[1])
+    for friction in (usual.components, usual_components(arm, top_speed)):
+        free = replace(usual, components=friction)
+        yield from _scored_alike([free, replace(free, method="excited"), replace(free, method=CONSISTENT)], held_out)
+        if arm.links is not None:
+            yield from _scored_alike([replace(free, pull=Pull("nominal", WIDE_TOLERANCE))], held_out)
 
-    A small joint counts as a large one.
-    """
-    fitted = identifiers[0].prepare(runs)
-    errors = ((each.held_out_errors(fitted), each) for each in identifiers)
-    return [(float(np.mean(np.log(np.maximum(own, 1e-300)))), each) for own, each in errors]
+
+def _scored_alike(identifiers: Sequence[Identifier], held_out: HeldOutBlocks) -> Iterator[tuple[Identifier, Array]]:
+    """Scores of identifiers of the same columns; without those that a solver or a missing package stops."""
+    fitted = identifiers[0].prepare(held_out.runs)
+    structure, signals, data = fitted
+    block = np.concatenate([own[each.filter.rows] for own, each in zip(held_out.blocks, signals, strict=True)])
+    for each in identifiers:
+        estimator = METHODS[each.method](fitted, each.pull)
+        try:
+            values = {number: estimator(data.rows(block != number)).values for number in held_out.numbers}
+        except (InputError, RuntimeError):
+            continue
+        models = {number: TorqueModel("", structure, own) for number, own in values.items()}
+
+        def predict(number: int, place: int, part: slice, models: dict[int, TorqueModel] = models) -> Array:
+            motion = signals[place].motion
+            own = Motion(motion.position[part], motion.velocity[part], motion.acceleration[part])
+            return models[number].torque(own, signals[place].run.rows(part))
+
+        yield each, held_out.scores(predict)

@@ -39,6 +39,7 @@ from armlab.identification.validation import (
 from armlab.recordings.cutoff_trial import choose_cutoff_hz
 from armlab.recordings.identifiable import require_identifiable, require_possible, require_torque
 from armlab.recordings.load import load_recording
+from armlab.recordings.plain_least_squares import PlainModel, fit_plain_rows, prepare_rows
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER, corrected_texts
 from armlab.recordings.reading.tuning import ReadingTuning
@@ -56,6 +57,7 @@ def identification_page(recording: Recording, identifier: Identifier, errors: tu
         f"Identification of {recording.name}",
         summary=f"Cut-off {model.cutoff_hz:.4g} Hz; condition number {identifier.condition_number_:.4g} (columns at "
         "unit length); each 95 % interval is for correlated errors.",
+        choices=model.provenance.get("choices", []),
         errors=_joint_errors(errors),
         filtered=filter_of_errors(errors),
         totals=[total_error_line(each) for each in errors],
@@ -111,12 +113,18 @@ def _joint_errors(errors: tuple[RunError, ...]) -> Table:
             str(joint.joint),
             f"{joint.rms:.4g}",
             format_percent(joint.percent),
+            format_percent(joint.percent_plain),
             format_percent(joint.percent_rated),
         ]
         for each in errors
         for joint in each.joints
     ]
-    return Table(["run", "role", "joint", "rms, N m", "of torque", "of rated torque"], rows, (0, 1), stacked=True)
+    return Table(
+        ["run", "role", "joint", "rms, N m", "of torque", "plain least squares", "of rated torque"],
+        rows,
+        (0, 1),
+        stacked=True,
+    )
 
 
 def _parameters(model: Model) -> Table:
@@ -141,8 +149,8 @@ NO_VALIDATION_WARNING = (
 
 @dataclass(frozen=True)
 class IdentifyOptions:
-    """method: one of METHODS, chosen if left out. tolerance: of a prior about the robot's own links. choose: by
-    cross-validation.
+    """method: one of METHODS, chosen if left out (`choose_identifier`). tolerance: of a prior about the robot's own
+    links. choose: by cross-validation.
 
     as_read: the recording and the robot file are not doubted. components: other ones than the usual.
     """
@@ -172,6 +180,7 @@ def fit_identifier(
     except DataError as error:
         raise InputError(f"{recording.folder}: {error}") from None
     facts = {"recording": recording.name, "runs": [run.name for run in runs], "version": version("armlab")}
+    facts |= {"choices": how} if how else {}
     identifier.model_.provenance.update(facts)
     return identifier, how
 
@@ -196,7 +205,8 @@ def identify_recording(
         _refuse_wrong_reading(recording, out)
     identifier, how = fit_identifier(recording, options, progress)
     model = identifier.model_
-    errors = tuple(run_error(model, model.signals(run)) for run in recording.runs)
+    plain = _plain_beside(recording, model)
+    errors = tuple(run_error(model, model.signals(run), plain) for run in recording.runs)
     yield from how
     yield from parameter_lines(model)
     yield from (f"{part.label}: no motion separates it from the links, left out" for part in identifier.absorbed_)
@@ -219,6 +229,16 @@ def identify_recording(
         "validated": bool(recording.with_role("validate")),
         "files": [file, report],
     }
+
+
+def _plain_beside(recording: Recording, model: Model) -> PlainModel | None:
+    """Plain least squares on the same runs behind the same cut-off; None where these are too short for it."""
+    cutoff = model.signals(recording.runs[0]).filter.cutoff_hz
+    try:
+        rows = [prepare_rows(run, cutoff) for run in recording.runs_to_identify()]
+        return fit_plain_rows(recording.arm, rows, cutoff)
+    except DataError:
+        return None
 
 
 def wrong_reading(recording: Recording) -> Answer | None:
@@ -253,7 +273,7 @@ def _build_identifier(recording: Recording, options: IdentifyOptions) -> tuple[I
         if options.method is not None or options.components is not None or options.tolerance:
             return Identifier(arm, options.components, options.method or USUAL_METHOD, pull, cutoff, robot), how
         chosen = choose_identifier(arm, recording.runs_to_identify(), cutoff, robot)
-        return chosen, [*how, f"estimator: {chosen.manner}, which predicts best on these blocks"]
+        return chosen.identifier, [*how, f"delivered: {chosen.sentence}"]
     groups = candidate_groups(arm)
     candidates = (pull,) if options.tolerance else candidate_pulls(arm)
     choice = select_structure(arm, recording.with_role("identify"), groups, candidates).choice

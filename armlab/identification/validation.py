@@ -1,7 +1,7 @@
 """How far a model's torque is from the recorded one: joint by joint, filtered and as recorded."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from armlab.common.arrays import Array
 from armlab.common.report.wording import format_number
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.differentiate import Signals
+from armlab.recordings.plain_least_squares import PlainModel
 
 MIN_TORQUE = 1e-9  # N m (N), root mean square: less is a signal without power, whose share says nothing
 
@@ -17,13 +18,15 @@ MIN_TORQUE = 1e-9  # N m (N), root mean square: less is a signal without power, 
 class JointError:
     """Errors of one joint, counted from 1: N m (N), percent of the torque, of the rated torque.
 
-    None for a percentage of a torque without power, and of one that is not known.
+    None for a percentage of a torque without power, and of one that is not known. percent_plain: what plain least
+    squares leaves, percent of the torque; None where it was not asked.
     """
 
     joint: int
     rms: float
     percent: float | None
     percent_rated: float | None
+    percent_plain: float | None = None
 
 
 @dataclass(frozen=True)
@@ -41,14 +44,18 @@ class RunError:
     joints: tuple[JointError, ...]
 
 
-def run_error(model: TorqueModel, signals: Signals) -> RunError:
-    """The errors of a model on a run."""
+def run_error(model: TorqueModel, signals: Signals, plain: PlainModel | None = None) -> RunError:
+    """The errors of a model on a run, with those of plain least squares beside them where it is given."""
     left = signals.torque - model.filtered_torque(signals)
+    plain_left = None if plain is None else signals.torque - signals.filter(plain.predict(signals.run))
     rows = signals.filter.rows
     recorded = signals.run.torque[rows]
     raw = recorded - model.torque(signals.motion, signals.run)[rows]
     each = range(len(model.arm))
     joints = tuple(_joint_error(model, joint, left[:, joint], signals.torque[:, joint]) for joint in each)
+    if plain_left is not None:
+        shares = (relative_percent(plain_left[:, joint], signals.torque[:, joint]) for joint in each)
+        joints = tuple(replace(own, percent_plain=share) for own, share in zip(joints, shares, strict=True))
     return RunError(
         run=signals.run.name,
         role=signals.run.role,
@@ -80,13 +87,14 @@ def error_table(errors: tuple[RunError, ...]) -> str:
     """A table in plain text; its first line says which torque the joints' errors are of."""
     lines = [
         f"errors of torque {filter_of_errors(errors)}:",
-        "run                   role      joint   rms N m  % of torque  % of rated",
+        "run                   role      joint   rms N m  % of torque  plain %  % of rated",
     ]
     for each in errors:
         for joint in each.joints:
-            percent, rated = ("-" if each is None else f"{each:.2f}" for each in (joint.percent, joint.percent_rated))
+            shares = joint.percent, joint.percent_plain, joint.percent_rated
+            percent, plain, rated = ("-" if each is None else f"{each:.2f}" for each in shares)
             name = f"{each.run:<21} {each.role:<9}"
-            lines.append(f"{name} {joint.joint:5d} {joint.rms:9.4g} {percent:>12} {rated:>11}")
+            lines.append(f"{name} {joint.joint:5d} {joint.rms:9.4g} {percent:>12} {plain:>8} {rated:>11}")
         lines.append(total_error_line(each))
     return "\n".join(lines)
 

@@ -41,7 +41,7 @@ def test_the_model_that_goes_to_files_predicts_as_plain_least_squares_does(yards
     model = yardstick.as_torque_model(identification_runs(observed))
     own, written = yardstick.residual(observed), filtered_residual(model, observed)
     rms = np.sqrt(np.mean(own**2, axis=0))
-    np.testing.assert_allclose(np.sqrt(np.mean(written**2, axis=0)), rms, rtol=0.2)  # of another sign of the velocity
+    np.testing.assert_allclose(np.sqrt(np.mean(written**2, axis=0)), rms, rtol=0.02)
     assert {part.effect for part in model.structure.components} >= {"coulomb_friction", "viscous_friction"}
 
 

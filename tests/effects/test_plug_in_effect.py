@@ -205,4 +205,6 @@ def test_identification_fits_an_installed_effect_as_a_component(diagnosed: Diagn
 def effect_named_at(name: str, joint: int) -> Any:
     """The candidate of a built-in effect at a joint, by the facts that stand in the library."""
     family = next(each for each in library() if each.effect == name)
-    return family.from_parameters(ARM, (joint,), {each.name: 1.0 for each in family.facts.parameters})[0]
+    return family.from_parameters(
+        ARM, (joint,), {each.name: 1.0 for each in family.facts.parameters if not each.detail}
+    )[0]

@@ -25,6 +25,7 @@ from armlab.identification.priors import NO_PULL
 from armlab.identification.regression import Regression
 from armlab.identification.torque_model import is_told
 from armlab.identification.validation import JointError, RunError, filter_in_words
+from armlab.recordings.cutoff_trial import choose_cutoff_hz
 from armlab.recordings.recording import Run
 from armlab.recordings.recording_file import Draft, DraftRun, write_recording
 
@@ -156,27 +157,42 @@ def test_directions_that_the_motion_hardly_excites_stay_zero_and_keep_the_interv
     np.testing.assert_allclose(excited.bread, free.bread, rtol=0.3)
 
 
-def test_short_motion_is_drawn_to_the_links_of_the_robot_file_and_predicts_other_motion_better() -> None:
+def test_a_model_that_predicts_left_out_blocks_better_is_delivered_and_the_cost_of_consistency_is_told() -> None:
     model = structure()
     short = run(model, truth(model), 0, noise=3.0, seconds=1.5)
-    chosen = choose_identifier(arm(), [short], 10.0, "irb120-arm")
-    assert "drawn to the links of the robot file" in chosen.manner
+    choice = choose_identifier(arm(), [short], choose_cutoff_hz(arm(), [short]), "irb120-arm")
+    assert "drawn to the links of the robot file" in choice.sentence
+    assert re.search(r"a physically consistent model errs \d+ % more", choice.sentence)
     other = run(model, truth(model), 1, seconds=10.0)
-    errors = [total(each.fit([short]).model_, other) for each in (chosen, Identifier(arm(), cutoff_hz=10.0))]
-    assert errors[0] < 0.5 * errors[1]
+    fitted = [each.fit([short]).model_ for each in (choice.identifier, Identifier(arm(), cutoff_hz=10.0))]
+    assert total(fitted[0], other) < 0.5 * total(fitted[1], other)
 
 
-def test_long_motion_is_fitted_by_least_squares_alone() -> None:
+def test_where_no_other_model_predicts_better_the_bodies_can_exist() -> None:
+    pytest.importorskip("clarabel")
     model = structure()
     long = run(model, truth(model), 0, noise=0.05, seconds=20.0)
-    assert choose_identifier(arm(), [long], 10.0, "irb120-arm").manner == "least squares"
+    choice = choose_identifier(arm(), [long], 10.0, "irb120-arm")
+    assert choice.identifier.method == "physical"
+    assert choice.identifier.fit([long]).model_.inertial is not None
+
+
+def test_bodies_that_cannot_exist_are_delivered_where_the_arm_has_them() -> None:
+    model = structure()
+    values = truth(model)
+    values[[name.startswith("coulomb") for name in model.names]] *= -0.2
+    driven = run(model, values, 0, noise=0.05, seconds=20.0)
+    choice = choose_identifier(arm(), [driven], 10.0, "irb120-arm")
+    assert choice.identifier.method != "physical"
+    assert choice.cost is not None
+    assert choice.cost > 0.1
 
 
 def test_an_arm_without_links_has_no_prior() -> None:
     bare = replace(arm(), links=None)
     model = structure()
     short = run(model, truth(model), 0, noise=3.0, seconds=1.5)
-    assert choose_identifier(bare, [short], 10.0, "bare").pull == NO_PULL
+    assert choose_identifier(bare, [short], 10.0, "bare").identifier.pull == NO_PULL
 
 
 def total(model: Model, other: Run) -> float:

@@ -6,6 +6,7 @@ from simulated_arm import arm, motion, scene, structure, truth
 from armlab.effects.contract import Candidate
 from armlab.effects.drive import RotorInertia
 from armlab.effects.friction import (
+    COULOMB_FRICTION,
     CoulombFriction,
     Levels,
     LoadFriction,
@@ -47,6 +48,17 @@ def test_coulomb_friction_is_averaged_over_the_interval_that_a_sample_stands_for
     found = [CoulombFriction.at(arm(), joint).columns(where)[:, 0, 0] for joint in (1, 2, 3)]
     # half an interval is 0.05 s and changes the velocity by 0.2: the sign is 0.1 / 0.2, and 1 or -1 beyond
     assert_allclose(found, [[0.5, 0.0], [1.0, 1.0], [-1.0, -1.0]])
+
+
+def test_smooth_coulomb_friction_is_small_where_a_joint_rests_and_whole_where_it_moves() -> None:
+    top_speed = np.array([2.0, 0.0, 1.0])
+    parts = [part for part in usual_components(arm(), top_speed) if part.effect == "coulomb_friction"]
+    assert [part.shape for part in parts] == [(0.02,), (0.01,), (0.01,)]
+    moved = Motion(np.zeros((3, 3)), np.array([[2.0, 0, 0], [1e-4, 0, 0], [-1e-4, 0, 0]]), np.zeros((3, 3)))
+    assert_allclose(columns(parts[0], moved).ravel(), [1.0, 0.005, -0.005], atol=1e-4)
+    stated = parts[0].parameters(np.array([3.0]))
+    read, coefficients = COULOMB_FRICTION.from_parameters(arm(), (1,), stated)
+    assert (read.parameters(coefficients), read.joint_fields(coefficients)) == (stated, {"frictionloss": 3.0})
 
 
 def test_friction_by_direction_has_a_level_for_each() -> None:

@@ -1,10 +1,12 @@
 """The cut-off of an identification by what it predicts on blocks of the runs that identify."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from armlab.common.errors import DataError
-from armlab.recordings.cutoff_trial import HARMONICS_JUDGED, CutoffTrial, choose_cutoff_hz, try_cutoffs
+from armlab.recordings.cutoff_trial import BLOCKS, HARMONICS_JUDGED, HeldOutBlocks, choose_cutoff_hz
 from armlab.recordings.plain_least_squares import suggested_cutoff_hz
 from armlab.recordings.recording import Run
 from problem.presets import load_arm
@@ -32,17 +34,38 @@ def test_vibrations_that_the_torque_does_not_follow_are_filtered_away() -> None:
     assert choose_cutoff_hz(ARM, [shaken]) < 40
 
 
-def test_a_higher_cutoff_is_chosen_where_one_standard_error_does_not_tell_it_from_the_best() -> None:
-    alike, worse = [0.0, 0.3, 0.3], [0.5, 0.5, 0.5]
-    best, low = [0.1, 0.2, 0.2], [0.9, 0.9, 0.9]
-    assert CutoffTrial((40.0, 20.0, 10.0, 5.0), np.array([worse, alike, best, low])).best_hz == 20.0
-    assert CutoffTrial((40.0, 20.0, 10.0), np.array([worse, best, low])).best_hz == 20.0
+def test_vibrations_above_the_motion_do_not_hide_what_models_differ_in_below() -> None:
+    quiet = run_with_vibration(0.0)
+    shaking = 5.0 * np.sin(2 * np.pi * 40 * quiet.time)[:, None]
+    held_out = HeldOutBlocks.of([replace(quiet, torque=quiet.torque + shaking)])
+    speed = np.gradient(held_out.runs[0].position, 1 / RATE_HZ, axis=0)
+    rest = 2.0 * np.sign(speed) + 3.0 * np.gradient(speed, 1 / RATE_HZ, axis=0)
+    models = [rest + slope * speed for slope in (1.5, 0.0)]
+    right, wrong = (held_out.scores(lambda number, place, part, torque=torque: torque[part]) for torque in models)
+    assert np.all(wrong > right + 0.05)
 
 
 def test_cutoffs_are_tried_from_the_harmonics_of_the_travel_down_to_ten_periods_of_the_longest_run() -> None:
-    trial = try_cutoffs(ARM, [run_with_vibration(0.0)])
-    assert trial.candidates_hz[0] == pytest.approx(HARMONICS_JUDGED * 1.1, rel=0.1)
-    assert 10 / 12 <= trial.candidates_hz[-1] < 2 * 10 / 12
+    tried = HeldOutBlocks.of([run_with_vibration(0.0)]).low_passes_hz
+    assert tried[0] == pytest.approx(HARMONICS_JUDGED * 1.1, rel=0.1)
+    assert 10 / 12 <= tried[-1] < 2 * 10 / 12
+
+
+def test_cutoffs_go_on_upwards_as_far_as_the_rate_carries_and_no_further_than_asked() -> None:
+    tried = HeldOutBlocks.of([run_with_vibration(0.0)])
+    top = tried.low_passes_hz[0]
+    assert tried.up_to(1.9 * top) is tried
+    assert tried.up_to(2 * top).low_passes_hz == (2 * top, *tried.low_passes_hz)
+    assert tried.up_to(1e6).low_passes_hz[0] <= 0.4 * RATE_HZ < 2 * tried.up_to(1e6).low_passes_hz[0]
+
+
+def test_slow_travel_that_starts_sharply_asks_for_higher_cutoffs() -> None:
+    time = np.arange(0, 24, 1 / RATE_HZ)
+    speed = np.column_stack([np.clip(20 * np.sin(2 * np.pi * time / period), -1, 1) for period in (4.0, 3.1, 4.7)])
+    position, change = np.cumsum(speed, axis=0) / RATE_HZ, np.gradient(speed, 1 / RATE_HZ, axis=0)
+    noise = 0.05 * np.random.default_rng(0).standard_normal(speed.shape)
+    run = Run("run.csv", "identify", time, position, torque=3.0 * change + 1.5 * speed + noise)
+    assert choose_cutoff_hz(ARM, [run]) > HeldOutBlocks.of([run]).low_passes_hz[0]
 
 
 def test_a_run_that_stands_most_of_the_time_is_cut_into_blocks_that_all_move() -> None:
@@ -52,16 +75,17 @@ def test_a_run_that_stands_most_of_the_time_is_cut_into_blocks_that_all_move() -
         np.pad(each, ((0, len(time) - len(each)), (0, 0)), mode="edge") for each in (moving.position, moving.torque)
     ]
     run = Run("run.csv", "identify", time, held[0], torque=held[1])
-    assert np.all(np.isfinite(try_cutoffs(ARM, [run]).scores))
+    assert HeldOutBlocks.of([run]).numbers == list(range(BLOCKS))
+    assert choose_cutoff_hz(ARM, [run]) < 60
 
 
 def test_without_a_run_there_is_no_cutoff() -> None:
     with pytest.raises(DataError, match="no run identifies"):
-        try_cutoffs(ARM, [])
+        choose_cutoff_hz(ARM, [])
 
 
 def test_an_arm_that_stands_has_no_cutoff() -> None:
     time = np.arange(0, 4, 1 / RATE_HZ)
     run = Run("run.csv", "identify", time, np.zeros((len(time), 3)), torque=np.ones((len(time), 3)))
     with pytest.raises(DataError, match="move too little"):
-        try_cutoffs(ARM, [run])
+        choose_cutoff_hz(ARM, [run])

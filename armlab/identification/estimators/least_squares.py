@@ -83,18 +83,21 @@ class WeightedLeastSquares:
     """Joints weighted by their residuals' deviation (Gautier 1997): a small motor's N m counts for more.
 
     tolerance: of `least_squares`. What it leaves at zero has the interval that it would have if it were fitted.
+    coordinates: (columns, unknowns), the unknowns whose directions the tolerance judges; the columns' own if left out.
     """
 
     rounds: int = 2
     tolerance: float = RANK_TOLERANCE
+    coordinates: Array | None = None
 
     def __call__(self, data: Regression) -> Estimate:
         """The estimate from these data."""
+        coordinates = np.eye(data.matrix.shape[1]) if self.coordinates is None else self.coordinates
         values = least_squares(data.matrix, data.torque)
         for _ in range(self.rounds):
             weights = joint_weights(data, values)
             weighted = data.weighted(weights)
-            values = least_squares(weighted.matrix, weighted.torque, self.tolerance)
+            values = coordinates @ least_squares(weighted.matrix @ coordinates, weighted.torque, self.tolerance)
         return Estimate(values, pseudo_inverse(weighted.matrix.T @ weighted.matrix), data.weighted(weights**2).matrix)
 
 

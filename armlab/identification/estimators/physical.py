@@ -82,6 +82,9 @@ class PhysicalLeastSquares:
         weights = self._weights(data)
         weighted = data.weighted(weights)
         inertial, values = self._solve(weighted)
+        for part, place in zip(self.structure.components, self.structure.slices, strict=True):
+            if isinstance(part, RotorInertia):  # the solver's rounding may leave one a hair below zero
+                values[place] = np.maximum(values[place], 0)
         gram, information = weighted.matrix.T @ weighted.matrix, None
         if self.pull.kind == "nominal":
             information = nominal_prior(self.structure, self.pull.size, self.pull.payload).information

@@ -15,6 +15,7 @@ from armlab.common.arrays import Array
 from armlab.common.errors import DataError
 from armlab.diagnosis.torque.predict.prediction import identification_runs
 from armlab.diagnosis.torque.rows.data import Observed, rows_in
+from armlab.identification.components import usual_components
 from armlab.identification.identifier import Identifier
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.cutoff_trial import choose_cutoff_hz
@@ -44,7 +45,8 @@ class Yardstick:
     def as_torque_model(self, runs: Sequence[Run]) -> TorqueModel:
         """The same as a model that goes to files; intervals are of the identification with the same terms."""
         plain, arm = self.model, self.model.layout.arm
-        fitted = Identifier(arm, cutoff_hz=self.cutoff_hz).fit(runs).model_
+        components = usual_components(arm, plain.layout.top_speed)
+        fitted = Identifier(arm, components, cutoff_hz=self.cutoff_hz).fit(runs).model_
         known = dict(zip(plain.layout.names, plain.values.tolist(), strict=True))
         links = np.array([known.get(name, 0.0) for name in arm.parameter_names])
         parts = (f"{PARAMETER_OF[part.effect]}{part.joint}" for part in fitted.structure.components)

@@ -108,7 +108,7 @@ def _left_by_identification(recording: Recording, plain: PlainFit) -> Array:
     """Residual of the usual identification, (rows, joints), as a share of each joint's torque."""
     runs = [run for run in split_runs(recording.runs) if run.role == "identify"]
     chosen = choose_identifier(recording.arm, runs, choose_cutoff_hz(recording.arm, runs), recording.arm.name)
-    model = chosen.fit(runs).model_
+    model = chosen.identifier.fit(runs).model_
     return _share_left(model, [each.rows for each in plain.held_out])
 
 
