@@ -122,7 +122,8 @@ def test_what_cannot_be_saved_is_told(many: Path, tmp_path: Path) -> None:
 def test_two_runners_on_one_store_share_the_work(small: Path, plug_in: PlugIn) -> None:
     notes = plug_in("time.sleep(0.05)")
     text = small.read_text().replace("[spso, de]", "[plug-in]").replace("repetitions: 3", "repetitions: 200")
-    small.write_text(text.replace("iterations: 4", "iterations: 999"))  # four trials a batch
+    text = text.replace("swarm_size: 5", "swarm_size: 500")
+    small.write_text(text.replace("iterations: 4", "iterations: 9"))  # 5,000 evaluations: four trials a batch
     commands = [
         [sys.executable, "-m", "armlab.cli.main", "run", small.name, "--workers", "1", "--results", f"r{k}"]
         for k in range(2)
