@@ -1,4 +1,4 @@
-"""A small experiment, the command in a process of its own, and an algorithm of a third party."""
+"""A small experiment, the command here and in a process of its own, and an algorithm of a third party."""
 
 import os
 import subprocess
@@ -7,8 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from small_results import Ran, ran
 
+from armlab.cli.main import main
 from bench.execute import load_algorithm
 from bench.result_sets.formats import read_results
 from bench.result_sets.result_set import ResultSet
@@ -66,8 +68,24 @@ def _found_from_any_folder(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def armlab(tmp_path: Path) -> Armlab:
-    """Runs `armlab` with arguments in an empty folder, in a process of its own."""
+def armlab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Armlab:
+    """Runs `armlab` with arguments in an empty folder, in this process: a start takes longer than the experiment."""
+
+    def run(*arguments: object) -> "subprocess.CompletedProcess[str]":
+        words = [str(word) for word in arguments]
+        with monkeypatch.context() as patched:
+            patched.chdir(tmp_path)
+            done = CliRunner().invoke(main, words)
+        if done.exception is not None and not isinstance(done.exception, SystemExit):
+            raise done.exception
+        return subprocess.CompletedProcess(words, done.exit_code, done.stdout, done.stderr)
+
+    return run
+
+
+@pytest.fixture
+def armlab_process(tmp_path: Path) -> Armlab:
+    """The same in a process of its own, for what a plug-in does to its process and for all that it prints."""
 
     def run(*arguments: object) -> "subprocess.CompletedProcess[str]":
         command = [sys.executable, "-m", "armlab.cli.main", *map(str, arguments)]

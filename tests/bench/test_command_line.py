@@ -55,8 +55,10 @@ def test_a_misspelt_command_of_a_noun_is_refused_with_the_nearest() -> None:
     assert "Did you mean 'table3'?" in CliRunner().invoke(main, ["paper", "tabel3"]).stderr
 
 
-def test_run_prints_the_table_and_the_winner_then_the_files(armlab: Armlab, small: Path, tmp_path: Path) -> None:
-    done = armlab("run", small)
+def test_run_prints_the_table_and_the_winner_then_the_files(
+    armlab_process: Armlab, small: Path, tmp_path: Path
+) -> None:
+    done = armlab_process("run", small)
     assert done.returncode == 0, done.stderr
     written = sorted(path.name for path in (tmp_path / "results").iterdir())
     assert written == ["small.csv", "small.md", "small.settings.yaml", "small_times.csv"]
@@ -128,25 +130,25 @@ def test_a_trial_that_raises_ends_the_run_with_exit_code_1_and_a_table_of_the_ot
 
 
 def test_what_a_plug_in_prints_does_not_stand_in_the_document(
-    armlab: Armlab, small: Path, plug_in: Callable[[str], Path]
+    armlab_process: Armlab, small: Path, plug_in: Callable[[str], Path]
 ) -> None:
     plug_in("print('from a plug-in', flush=True)")
     small.write_text(small.read_text().replace("[spso, de]", "[plug-in]"))
-    done = armlab("run", small, "--workers", "1", "--json")
+    done = armlab_process("run", small, "--workers", "1", "--json")
     assert json.loads(done.stdout)["experiments"][0]["name"] == "small"
     assert "from a plug-in" in done.stderr
 
 
 def test_a_plug_in_that_ends_its_process_fails_alone(
-    armlab: Armlab, small: Path, plug_in: Callable[[str], Path]
+    armlab_process: Armlab, small: Path, plug_in: Callable[[str], Path]
 ) -> None:
     plug_in("__import__('os')._exit(7)")
     small.write_text(small.read_text().replace("[spso, de]", "[plug-in, de]"))
-    done = armlab("run", small, "--workers", "1")
+    done = armlab_process("run", small, "--workers", "1")
     assert done.returncode == 1
     assert "3 trials failed" in done.stderr
     small.write_text(small.read_text().replace("[plug-in, de]", "[de]"))
-    assert "3 trials, 3 done, 0 to do" in armlab("run", small, "--dry-run").stdout
+    assert "3 trials, 3 done, 0 to do" in armlab_process("run", small, "--dry-run").stdout
 
 
 def test_list_names_algorithms_and_problems(armlab: Armlab) -> None:

@@ -151,10 +151,12 @@ def test_a_box_without_width_is_refused_before_any_trial(
         list(describe_run(small, RunOptions(small.with_name("s.sqlite"), small.parent / "r", 1)))
 
 
-def test_a_package_that_ends_its_process_does_not_end_the_command(small: Path, plug_in: PlugIn, armlab: Armlab) -> None:
+def test_a_package_that_ends_its_process_does_not_end_the_command(
+    small: Path, plug_in: PlugIn, armlab_process: Armlab
+) -> None:
     plug_in("import os; os._exit(139)")
     small.write_text(small.read_text().replace("[spso, de]", "[plug-in, de]"))
     for arguments in (["--workers", 1], ["--dry-run"]):
-        done = armlab("run", small.name, *arguments)
+        done = armlab_process("run", small.name, *arguments)
         assert done.returncode == 1
         assert "WorkerLostError" in done.stderr

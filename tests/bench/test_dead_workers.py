@@ -33,7 +33,7 @@ from contextlib import suppress
 from bench.executors.local import local_executor
 
 if __name__ == "__main__":
-    for _ in range(15):  # the moment is short: some of them hit it
+    for _ in range(5):  # the moment is short: nearly every one hits it
         with local_executor(2, None) as executor:
             for future in [executor.submit([]) for _ in range(4)]:
                 future.result(timeout=60)
@@ -47,7 +47,7 @@ STOPPED_AFTER_SUBMITTING = """\
 from bench.executors.local import local_executor
 
 if __name__ == "__main__":
-    for _ in range(15):  # the moment is short: some of them hit it
+    for _ in range(5):  # the moment is short: nearly every one hits it
         with local_executor(2, None) as executor:
             executor.submit([]).result(timeout=60)
             for _ in range(3):

@@ -122,7 +122,8 @@ def test_what_cannot_be_saved_is_told(many: Path, tmp_path: Path) -> None:
 def test_two_runners_on_one_store_share_the_work(small: Path, plug_in: PlugIn) -> None:
     notes = plug_in("time.sleep(0.05)")
     text = small.read_text().replace("[spso, de]", "[plug-in]").replace("repetitions: 3", "repetitions: 200")
-    small.write_text(text.replace("iterations: 4", "iterations: 999"))  # four trials a batch
+    text = text.replace("swarm_size: 5", "swarm_size: 500")
+    small.write_text(text.replace("iterations: 4", "iterations: 9"))  # 5,000 evaluations: four trials a batch
     commands = [
         [sys.executable, "-m", "armlab.cli.main", "run", small.name, "--workers", "1", "--results", f"r{k}"]
         for k in range(2)
@@ -143,7 +144,7 @@ def test_two_runners_on_one_store_share_the_work(small: Path, plug_in: PlugIn) -
     ],
 )
 def test_a_trial_that_hangs_is_ended_and_told_and_the_others_are_kept(
-    small: Path, plug_in: PlugIn, armlab: Armlab, hang: str
+    small: Path, plug_in: PlugIn, armlab_process: Armlab, hang: str
 ) -> None:
     plug_in(f"if population[0, 0] > 0: {hang}")
     text = small.read_text().replace("[spso, de]", "[plug-in, de]").replace("repetitions: 3", "repetitions: 4")
@@ -151,7 +152,7 @@ def test_a_trial_that_hangs_is_ended_and_told_and_the_others_are_kept(
     entries = load_experiment(small).entries
     stuck = [entry for entry in entries if entry.algorithm == "plug-in" and _first_coordinate(entry.trial) > 0]
     assert 0 < len(stuck) < 4
-    done = armlab("run", small.name)
+    done = armlab_process("run", small.name)
     assert done.returncode == 1
     which = ", ".join(str(entry.trial.repetition) for entry in stuck)
     assert f"{stuck[0].trial.series_text}, repetition {which}: WorkerLostError: the worker process died twice" in (
@@ -172,7 +173,7 @@ def _first_coordinate(trial: object) -> float:
 
 
 def test_a_worker_that_is_killed_by_its_trial_is_replaced_and_the_trial_named(
-    small: Path, plug_in: PlugIn, armlab: Armlab
+    small: Path, plug_in: PlugIn, armlab_process: Armlab
 ) -> None:
     plug_in("if population[0, 0] > 0: __import__('os').kill(__import__('os').getpid(), 9)")
     text = small.read_text().replace("[spso, de]", "[plug-in, de]").replace("iterations: 4", "iterations: 3999")
@@ -180,7 +181,7 @@ def test_a_worker_that_is_killed_by_its_trial_is_replaced_and_the_trial_named(
     entries = load_experiment(small).entries
     fatal = [entry for entry in entries if entry.algorithm == "plug-in" and _first_coordinate(entry.trial) > 0]
     assert fatal
-    done = armlab("run", small.name, "--workers", "2")
+    done = armlab_process("run", small.name, "--workers", "2")
     assert done.returncode == 1
     assert f"{len(fatal)} trials failed" in done.stderr
     assert _count(small.parent / ".armlab" / "runs.sqlite") == len(entries) - len(fatal)

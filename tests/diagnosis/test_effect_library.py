@@ -79,9 +79,10 @@ def test_every_joint_that_moves_has_each_effect_of_a_joint(kinds: str) -> None:
 
 @pytest.mark.parametrize("kinds", KINDS)
 def test_parameters_are_those_of_the_vocabulary_or_of_a_single_form_and_have_units(kinds: str) -> None:
+    where = scenes_of(kinds)[0]
     for each in every(kinds):
         known = {parameter.name for parameter in effect_named(each.effect).parameters}
-        named = each.parameters(drawn(each, each.columns(scenes_of(kinds)[0]).shape[2]))
+        named = each.parameters(drawn(each, each.columns(where).shape[2]))
         assert set(named) <= known | BEYOND, each
         assert all(each.unit(name) for name in named), each
 

@@ -214,7 +214,7 @@ def test_a_table_of_latex_escapes_what_latex_would_take_for_a_command():
     ]
 
 
-@pytest.mark.parametrize("words", [("paper", "table3", "--dry-run"), ("run", "configs/suite.yaml", "--dry-run")])
+@pytest.mark.parametrize("words", [("paper", "table3", "--dry-run"), ("run", "configs/figure3.yaml", "--dry-run")])
 def test_a_command_takes_the_configurations_that_come_with_armlab_where_the_folder_has_none(words, here):
     status, out, err = told(*words)
     assert (status, err) == (0, "")

@@ -12,8 +12,8 @@ import csv
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -173,16 +173,8 @@ def lerobot_log(folder: Path) -> ForeignLog:
     robot = folder / "so101.xml"
     robot.write_text(so101_text({}))
     hidden: Hidden = (("controller_gain_error", 3, {"kp": 9.0}),)
-    model = mujoco.MjModel.from_xml_string(so101_text({"elbow_flex": 9.0}, timestep=1e-4))  # an arm has no steps
-    rows: dict[str, list[Any]] = {name: [] for name in ("action", "observation.state")}
     episodes, frames = SO101_EPISODES, round(SO101_SECONDS * SO101_FPS)
-    for episode in range(episodes):
-        command = _so101_commands(np.random.default_rng(episode), frames)
-        position = _so101_positions(model, command)
-        for name, values in (("action", command), ("observation.state", position)):
-            vectors = np.column_stack([np.degrees(values[:, :5]), 50 + 40 * values[:, 5]]).astype(np.float32)
-            rows[name] += list(vectors)
-    table = pd.DataFrame(rows)
+    table = pd.DataFrame({name: list(vectors) for name, vectors in _so101_vectors().items()})
     frame = np.tile(np.arange(frames), episodes)
     table["timestamp"] = (frame / SO101_FPS).astype(np.float32)
     table["frame_index"], table["episode_index"] = frame, np.repeat(np.arange(episodes), frames)
@@ -215,6 +207,18 @@ def lerobot_log(folder: Path) -> ForeignLog:
     }
     (dataset / "meta/info.json").write_text(json.dumps(info, indent=4))
     return ForeignLog((dataset,), robot, {}, hidden)
+
+
+@cache
+def _so101_vectors() -> dict[str, np.ndarray]:
+    """Commands and positions of all episodes, (frames, 6), degrees and percent."""
+    model = mujoco.MjModel.from_xml_string(so101_text({"elbow_flex": 9.0}, timestep=1e-4))  # an arm has no steps
+    vectors: dict[str, list[np.ndarray]] = {"action": [], "observation.state": []}
+    for episode in range(SO101_EPISODES):
+        command = _so101_commands(np.random.default_rng(episode), round(SO101_SECONDS * SO101_FPS))
+        for name, values in (("action", command), ("observation.state", _so101_positions(model, command))):
+            vectors[name].append(np.column_stack([np.degrees(values[:, :5]), 50 + 40 * values[:, 5]]))
+    return {name: np.concatenate(parts).astype(np.float32) for name, parts in vectors.items()}
 
 
 def _so101_commands(rng: np.random.Generator, frames: int) -> np.ndarray:

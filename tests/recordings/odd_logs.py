@@ -115,6 +115,11 @@ def in_turn(table: pd.DataFrame) -> pd.DataFrame:
     return out
 
 
+def thinned(table: pd.DataFrame, lost: float) -> pd.DataFrame:
+    """Without a share of the rows, by chance."""
+    return table[np.random.default_rng(0).random(len(table)) >= lost]
+
+
 def coarse(table: pd.DataFrame, rate_hz: float) -> pd.DataFrame:
     """Stamps of a clock with so many ticks a second."""
     return table.assign(t=np.floor(table["t"] * rate_hz + 1e-6) / rate_hz)
@@ -390,6 +395,17 @@ FROM_LOGS = (
         csv("log.csv", lambda table: coarse(in_turn(table), 100.0)),
         "torques fit the motion better half a step of 10 ms away",
         is_read=False,
+    ),
+    OddLog(
+        "the same, with rows lost and three steps of the clock for each two rows",
+        csv("log.csv", lambda table: coarse(thinned(in_turn(table), 0.05), 300.0)),
+        "torques fit the motion better half a step of 3.333 ms away",
+        is_read=False,
+    ),
+    OddLog(
+        "positions and torques in alternate rows of an even clock, a third of the rows lost",
+        csv("log.csv", lambda table: thinned(in_turn(table), 0.33)),
+        "signals come in rows of their own",
     ),
     OddLog(
         "positions and torques of one instant in rows of their own",

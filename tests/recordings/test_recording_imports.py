@@ -9,7 +9,7 @@ import pytest
 from gripper_robots import GRIPPER_URDF
 from joint_state_bags import write_bag
 from numpy.testing import assert_allclose, assert_array_equal
-from odd_logs import in_turn
+from odd_logs import coarse, in_turn, thinned
 from recording_folders import POSITION, TORQUE, frame
 from refusals import refusal
 from scipy.io import savemat
@@ -275,7 +275,7 @@ def test_rows_without_a_stamp_are_left_out_of_signals_in_rows_of_their_own_and_s
     rows.assign(t=rows["t"].where(np.arange(len(rows)) % 3 > 0)).to_csv(path, index=False)
     given = {**OPTIONS, "time": "t", "position": "q*", "torque": "tau*"}
     (source,) = plan_import([path], {**given, "out": tmp_path / "recording"}).sources.values()
-    (note,) = [each.text for each in source.table.findings]
+    (note,) = [each.text for each in source.table.findings if each.kind == "several_rates"]
     assert f"; {-(-len(rows) // 3)} rows have no stamp and are left out" in note
     import_files([path], tmp_path / "recording", given)
     (run,) = load_recording(tmp_path / "recording").runs
@@ -317,3 +317,17 @@ def test_a_pattern_that_fits_nothing_is_told_though_another_fits_an_empty_column
     frame().assign(q2="").to_csv(path, index=False)
     told = refusal(import_files, [path], tmp_path / "new", {**OPTIONS, "position": "q?,p*"})
     assert told.startswith("no column 'p*' for position")
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "lost", "is_coarse"),
+    [(200.0, 0.05, False), (200.0, 0.33, False), (300.0, 0.05, True), (300.0, 0.33, True)],
+)
+def test_a_clock_is_called_coarse_where_rows_come_unevenly_in_its_steps_and_not_where_rows_of_an_even_one_are_lost(
+    rate_hz: float, lost: float, is_coarse: bool, tmp_path: Path
+) -> None:
+    coarse(thinned(in_turn(frame()), lost), rate_hz).to_csv(tmp_path / "log.csv", index=False)
+    (source,) = plan_import([tmp_path / "log.csv"], {**OPTIONS, "out": tmp_path / "new"}).sources.values()
+    said = [each.text for each in source.table.findings if each.kind == "coarse_stamps"]
+    assert len(said) == is_coarse
+    assert all("known to 1.67 ms" in each for each in said)

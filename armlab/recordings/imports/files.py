@@ -14,7 +14,7 @@ from armlab.recordings.imports.gears import Gear
 from armlab.recordings.imports.packed import PACKED_SUFFIXES
 from armlab.recordings.imports.plan import ImportPlan, plan_import
 from armlab.recordings.imports.questions import Options
-from armlab.recordings.imports.rates import ONE_INSTANT, require_one_instant
+from armlab.recordings.imports.rates import UnsureTimes, require_times
 from armlab.recordings.imports.robots import ImportedRobot
 from armlab.recordings.imports.sources import Source
 from armlab.recordings.load import load_recording
@@ -64,12 +64,13 @@ def write_plan(plan: ImportPlan) -> ImportedRecording:
     copies = plan.robot.copies(folder)
     whole = folder / plan.robot.whole_name if plan.robot.whole_name in copies else None
     described, document = describe_plan(plan), _describe_runs(plan, draft)
-    shares_stamps = any(each.kind == ONE_INSTANT for source in plan.sources.values() for each in source.table.findings)
+    findings = (each for source in plan.sources.values() for each in source.table.findings)
+    half_step_s = min((each.half_step_s for each in findings if isinstance(each, UnsureTimes)), default=None)
     write_recording(draft, folder, copies)
     plan = replace(plan, sources={})  # with the runs of the draft, as much memory as what is read now
     del draft
     try:
-        repairs, useless = _read_written(folder, shares_stamps)
+        repairs, useless = _read_written(folder, half_step_s)
     except InputError as error:
         _remove_written(folder, was_there)
         raise InputError(f"nothing is written: {str(error).replace(f'{folder}{os.sep}', '')}") from None
@@ -140,10 +141,10 @@ def _repairs_of(runs: Sequence[MotionRun]) -> tuple[tuple[str, str], ...]:
     return tuple(dict.fromkeys((run.file, finding.text) for run in runs for finding in run.repairs))
 
 
-def _read_written(folder: Path, shares_stamps: bool) -> tuple[tuple[tuple[str, str], ...], tuple[str, ...]]:
+def _read_written(folder: Path, half_step_s: float | None) -> tuple[tuple[tuple[str, str], ...], tuple[str, ...]]:
     """What reading repairs, and why nothing can be identified from what was written, if that is so.
 
-    shares_stamps: whether rows of different signals were taken as one instant.
+    half_step_s: by which signals may be apart in time, where the torques have to tell.
     Raises InputError for what no command could use, a torque that no joint has among it.
     """
     if is_motion_only(folder):
@@ -152,8 +153,8 @@ def _read_written(folder: Path, shares_stamps: bool) -> tuple[tuple[tuple[str, s
     runs = recording.with_role("identify") or recording.runs
     if has_no_torque(runs):
         raise InputError(f"{runs[0].file}: {reason_dead(runs, recording.arm)}")
-    if shares_stamps:
-        require_one_instant(runs, recording.arm)
+    if half_step_s is not None:
+        require_times(runs, recording.arm, half_step_s)
     reason = reason_not_identifiable(recording) if recording.with_role("identify") else None
     return _repairs_of(recording.runs), () if reason is None else (reason,)
 

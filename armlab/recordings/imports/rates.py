@@ -5,7 +5,8 @@ rows, by a cubic spline if it is smooth, else linearly; over a gap of its own it
 lose part of the motion: a dt^2 / 8 of an acceleration a.
 
 Rows with one stamp are of one instant where all signals share it. Elsewhere a clock may be coarser than the rows: they
-are put on an even grid that fits, unless the motion shows that they came when their stamps say.
+are put on an even grid that fits, unless the motion shows that they came when their stamps say. Where stamps and motion
+do not tell when the rows of one signal came beside those of another, the torques are asked.
 """
 
 from collections.abc import Mapping, Sequence
@@ -41,8 +42,18 @@ from armlab.recordings.table import Table
 from problem.arm import Arm
 
 EDGE_ROWS = 2  # of a clock, before and after which the other signal has no row
-ONE_INSTANT = "one_instant"  # of rows with one stamp; the import asks the torques whether it is so
+MAX_TICKS_PER_ROW = 2  # of a clock that is coarse beside the rows
 SMOOTH_SIGNALS = ("position", "link_position", "velocity")
+
+
+@dataclass(frozen=True)
+class UnsureTimes(Finding):
+    """Stamps of different signals of which the torques have to tell whether they are right.
+
+    half_step_s: by which signals may be apart, half of what the stamps tell apart.
+    """
+
+    half_step_s: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +147,8 @@ def _times_of_rows(run: MotionRun, known: NDArray[np.bool_], slowest: int) -> tu
     once = [len(np.unique(place[column])) >= (1 - MAX_LOST_SHARE) * column.sum() for column in known.T]
     if all(once) and np.mean(shared) >= 1 - MAX_LOST_SHARE:
         text = "rows of different signals with one stamp are taken as one instant"
-        return run.time, Finding(ONE_INSTANT, "note", text)
+        half_step = float(np.median(np.diff(np.unique(run.time[known[:, slowest]])))) / 2
+        return run.time, UnsureTimes("one_instant", "note", text, half_step_s=half_step)
     require_fine_clock(run.file, run.time)
     grid = fit_grid(run.time, np.arange(run.samples))
     worst = float(np.abs(grid.lateness).max() / grid.step)
@@ -149,28 +161,51 @@ def _times_of_rows(run: MotionRun, known: NDArray[np.bool_], slowest: int) -> tu
             f"{run.file}: the time counts in steps of {np.median(np.diff(np.unique(run.time))):.4g} s, and the rows "
             "come unevenly, a signal in each: export them with stamps that tell rows apart, or in common rows"
         )
-    return run.time, None
+    tick = _coarse_tick(run.time)
+    if tick is None:
+        return run.time, None
+    text = (
+        f"the time counts in steps of {1e3 * tick:.4g} ms, and rows come unevenly: when signals came beside each other "
+        f"is known to {5e2 * tick:.3g} ms"
+    )
+    return run.time, UnsureTimes("coarse_stamps", "note", text, half_step_s=tick / 2)
 
 
-def require_one_instant(runs: Sequence[Run], arm: Arm) -> None:
+def _coarse_tick(time: Array) -> float | None:
+    """The step, s, in which the time counts, if it is half as long as rows are apart, or more, and rows come unevenly.
+
+    Where an even clock lost every second row by chance, two steps come half as often as one, else less often.
+    """
+    stamps = np.unique(time)
+    steps = np.diff(stamps)
+    ticks = np.rint(steps / steps.min()).astype(np.intp)
+    grid = fit_grid(stamps, np.append(0, np.cumsum(ticks)))
+    is_counted = np.abs(grid.lateness).max() <= MAX_ROUNDING_LATENESS * grid.step
+    is_uneven = np.sum(ticks == 2) > 0.5 * np.sum(ticks == 1)
+    return grid.step if is_counted and is_uneven and np.median(ticks) <= MAX_TICKS_PER_ROW else None
+
+
+def require_times(runs: Sequence[Run], arm: Arm, half_step_s: float) -> None:
     """Raises InputError where torques explain the motion better half a step earlier or later: the clock is too coarse.
 
-    runs: of rows with one stamp that were taken as one instant. Each of three clocks is judged by what plain least
-    squares on the arm leaves of the torque.
+    Each of three clocks is judged by what plain least squares on the arm leaves of the torque. A wrong clock adds the
+    square of its error: squares whose parabola has no bottom within a step tell nothing.
     """
     fitted = [replace(run, role="identify") for run in runs]
-    step = min(float(np.median(np.diff(run.time))) for run in runs)
     try:
         left = [
-            float(np.log(fit_plain(arm, [read_late(run, np.full(run.joints, late)) for run in fitted]).rms).sum())
-            for late in (0.0, step / 2, -step / 2)
+            fit_plain(arm, [read_late(run, np.full(run.joints, late)) for run in fitted]).rms
+            for late in (0.0, half_step_s, -half_step_s)
         ]
     except DataError:
         return  # too short for a fit, and so for all that asks more of it
-    if left[0] > min(left):
+    now, late, early = (float(np.sum((each / left[0]) ** 2)) for each in left)
+    has_bottom = abs(early - late) / 2 < 2 * (early + late - 2 * now)
+    logarithms = [float(np.log(each).sum()) for each in left]
+    if has_bottom and logarithms[0] > min(logarithms):
         raise InputError(
-            f"{runs[0].file}: rows of different signals share stamps, and torques fit the motion better half a step of "
-            f"{1e3 * step:.4g} ms away: the clock is coarser than the rows; export stamps that tell rows apart"
+            f"{runs[0].file}: signals stand in rows of their own, and torques fit the motion better half a step of "
+            f"{2e3 * half_step_s:.4g} ms away: the clock is coarser than the rows; export stamps that tell rows apart"
         )
 
 
