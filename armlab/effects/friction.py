@@ -203,10 +203,12 @@ class CoulombFriction(Term):
 
 @dataclass(frozen=True)
 class SmoothCoulombFriction(Term):
-    """level tanh(qd / velocity); shape: the velocity, rad/s (m/s).
+    """level tanh(qd / velocity); turning: the velocity, rad/s (m/s), which is chosen and not fitted.
 
     The sign of the velocity of a joint that rests is that of the noise of its encoder. Here its friction is small.
     """
+
+    turning: float = 1.0
 
     facts = COULOMB_FACTS
     names = ("level", "velocity")
@@ -217,22 +219,22 @@ class SmoothCoulombFriction(Term):
         return []
 
     def columns(self, scene: Scene) -> Array:
-        return self._stacked(np.tanh(scene.motion.velocity[:, self.own] / self.shape[0]))
+        return self._stacked(np.tanh(scene.motion.velocity[:, self.own] / self.turning))
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        return {"level": float(coefficients[0]), "velocity": self.shape[0]}
+        return {"level": float(coefficients[0]), "velocity": self.turning}
 
     def joint_fields(self, coefficients: Array) -> dict[str, float]:
         """`frictionloss` of a simulator's joint, which has no such velocity."""
         return {"frictionloss": float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
-        level, velocity = format_number(coefficients[0]), format_number(self.shape[0])
+        level, velocity = format_number(coefficients[0]), format_number(self.turning)
         return f"tau_{self.joint} += {level} tanh(qd_{self.joint} / {velocity})"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        return cls.at(arm, joints[0], shape=(float(parameters["velocity"]),)), np.array([parameters["level"]])
+        return cls.at(arm, joints[0], turning=float(parameters["velocity"])), np.array([parameters["level"]])
 
 
 @dataclass(frozen=True)

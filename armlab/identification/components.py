@@ -36,7 +36,7 @@ def usual_components(arm: Arm, top_speed: Array | None = None) -> tuple[Candidat
     if top_speed is not None:
         widths = COULOMB_WIDTH * np.where(top_speed > 0, top_speed, 1.0)
         coulomb = tuple(
-            SmoothCoulombFriction.at(arm, joint, shape=(float(width),)) for joint, width in enumerate(widths, 1)
+            SmoothCoulombFriction.at(arm, joint, turning=float(width)) for joint, width in enumerate(widths, 1)
         )
     return (
         *springs,

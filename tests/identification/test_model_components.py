@@ -53,7 +53,7 @@ def test_coulomb_friction_is_averaged_over_the_interval_that_a_sample_stands_for
 def test_smooth_coulomb_friction_is_small_where_a_joint_rests_and_whole_where_it_moves() -> None:
     top_speed = np.array([2.0, 0.0, 1.0])
     parts = [part for part in usual_components(arm(), top_speed) if part.effect == "coulomb_friction"]
-    assert [part.shape for part in parts] == [(0.02,), (0.01,), (0.01,)]
+    assert [part.turning for part in parts] == [0.02, 0.01, 0.01]
     moved = Motion(np.zeros((3, 3)), np.array([[2.0, 0, 0], [1e-4, 0, 0], [-1e-4, 0, 0]]), np.zeros((3, 3)))
     assert_allclose(columns(parts[0], moved).ravel(), [1.0, 0.005, -0.005], atol=1e-4)
     stated = parts[0].parameters(np.array([3.0]))
