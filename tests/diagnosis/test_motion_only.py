@@ -39,7 +39,7 @@ from armlab.identification.model_file import read_model
 from armlab.recordings.motion import load_motion_recording
 from armlab.recordings.recording import MotionRun
 from armlab.report.motion.compare_write import comparison_page, make_motion_comparison
-from armlab.report.motion.motion_page import joint_table, motion_page
+from armlab.report.motion.motion_page import joint_table, motion_page, untold_table
 from armlab.report.motion.motion_verdict import make_motion_verdict, motion_texts
 from armlab.report.motion.motion_words import error_phrase, motion_lines
 from armlab.report.verdict import verdict_of
@@ -92,6 +92,16 @@ def test_a_finding_is_told_in_the_units_of_a_reader(diagnosis: MotionDiagnosis) 
     told = [line for line in lines if line.startswith("  ") and ("Coulomb" in line or "delay" in line)]
     assert told
     assert not any("_" in line for line in told)
+
+
+def test_what_the_motion_does_not_tell_is_told(diagnosis: MotionDiagnosis) -> None:
+    """A late command and a late reading look alike; every joint that has a servo has a row of its own."""
+    delay = next(each for each in diagnosis.findings if each.effect == "command_delay")
+    row = diagnosis.simulation.joints.index(delay.joint - 1)
+    assert "channel_skew" in diagnosis.rivals[row][place("delay")]
+    said = [line for line in motion_lines(diagnosis, verbose=True) if "not told at" in line]
+    assert any("command delay from channel skew" in line for line in said)
+    assert len(said) == sum(map(len, diagnosis.rivals)) == len(untold_table(diagnosis).rows)
 
 
 def test_held_out_replay_comes_near_the_encoder(diagnosis: MotionDiagnosis) -> None:

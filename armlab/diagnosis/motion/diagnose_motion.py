@@ -21,6 +21,7 @@ from armlab.diagnosis.motion.differences import (
     name_delay,
     name_differences,
     name_payload,
+    rivals_of_numbers,
     with_given_delay,
     with_given_nominal,
 )
@@ -225,15 +226,26 @@ class HeldOut:
                 each.joint for each, own in zip(errors, chosen, strict=True) if own is None or not follows[each.joint]
             ),
             currents=correlate_currents(held_out, simulation, servos.values),
+            rivals=tuple({} if each is None else self._rivals(number, each) for number, each in enumerate(chosen)),
         )
 
     def _name(self, number: int, chosen: ChosenServo) -> list[ServoFinding]:
         """The findings of a joint, from 0, that are told."""
         simulation = self.fit.simulation
-        mass_error = min((each.error for each in self.shared if each.number is TOOL_MASS), default=np.inf)
         windows = self.fit.windows[number], self.judged[number]
-        differs = name_differences(number, chosen, simulation, windows, mass_error, self.tuning)
+        differs = name_differences(number, chosen, simulation, windows, self._mass_error, self.tuning)
         return [each for each in with_given_delay(differs, self.given, simulation.delay) if self._is_told(each)]
+
+    def _rivals(self, number: int, chosen: ChosenServo) -> dict[int, tuple[str, ...]]:
+        """What the motion of a joint, from 0, does not tell from each fitted number."""
+        return rivals_of_numbers(
+            number, chosen, self.fit.simulation, self.fit.windows[number], self._mass_error, self.tuning
+        )
+
+    @property
+    def _mass_error(self) -> float:
+        """Of a mass at the tool that all joints share, kg."""
+        return min((each.error for each in self.shared if each.number is TOOL_MASS), default=np.inf)
 
     def _is_told(self, finding: ServoFinding) -> bool:
         """Whether it is more than the clock of a drive that holds, or of a simulator, makes."""

@@ -9,7 +9,7 @@ from scipy.stats import t as student
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.arm_fit import ArmFit, number_of_tests
 from armlab.diagnosis.motion.choose import TESTS_OF_GAIN, ChosenServo, GainOfNumber
-from armlab.diagnosis.motion.estimate import rms_of
+from armlab.diagnosis.motion.estimate import ServoFit, rms_of
 from armlab.diagnosis.motion.held_out import command_error, settled_errors
 from armlab.diagnosis.motion.motion_result import ServoFinding
 from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
@@ -45,12 +45,10 @@ def name_differences(
         return []
     learned, judged = windows
     fit, (low, high) = chosen.fit, chosen.fit.interval()
-    sound = learned.select(np.setdiff1d(np.arange(learned.count), chosen.odd)).with_integral(fit.integral)
+    sound = _sound_windows(learned, chosen)
     confused = confused_parameters(sound, replace(fit, free=chosen.free), mass_error, tuning)
     unknown_gain = bool(np.isnan(simulation.nominal.values[number, place("kp")]))
-    scale: tuple[str, ...] = ("inertial_parameter_error",) if unknown_gain else ()
-    if has_weak_load(sound, fit.values, tuning):
-        scale = ("rotor_inertia", "inertial_parameter_error")
+    scale = _rivals_by_scale(unknown_gain, sound, fit, tuning)
     errors = [settled_errors(judged, _with_nominal(chosen, each)) for each in chosen.gains]
     after, found = rms_of(settled_errors(judged, fit.values)), []
     for place_of, gain, error in zip(chosen.gains, chosen.gains.values(), errors, strict=True):
@@ -63,13 +61,51 @@ def name_differences(
         if parameter.key == "kp":
             said = _with_unknown_clock(said, float(fit.values[place("ki")]), tuning)
         others = [other for other in confused[place_of] if not (chosen.free[other] and np.isfinite(said.nominal))]
-        rivals = (*parameter.rivals, *(PARAMETERS[other].effect for other in others))
-        rivals = (*rivals, *(scale if parameter.key in TORQUE_SCALED else ()))
+        rivals = _rivals_of(parameter, others, scale)
         before = rms_of(error) if np.isfinite(said.nominal) else rms_of(command_error(judged))
         joint, chance = simulation.number_of(number), _corrected_chance(gain, len(simulation.joints))
         one = said.finding(parameter, joint, (before, after), chance, rivals)
         found += [] if one.holds_nominal else [one]
     return found
+
+
+def rivals_of_numbers(
+    number: int,
+    chosen: ChosenServo,
+    simulation: ServoSimulation,
+    learned: Windows,
+    mass_error: float = np.inf,
+    tuning: MotionTuning = DEFAULT,
+) -> dict[int, tuple[str, ...]]:
+    """The effects that the motion of a joint does not tell from each number that was fitted, by the number's place.
+
+    learned: windows of the runs that identify. mass_error: as in `name_differences`.
+    """
+    sound, fit = _sound_windows(learned, chosen), chosen.fit
+    confused = confused_parameters(sound, fit, mass_error, tuning)
+    unknown_gain = bool(np.isnan(simulation.nominal.values[number, place("kp")]))
+    scale = _rivals_by_scale(unknown_gain, sound, fit, tuning)
+    out = {at: _rivals_of(PARAMETERS[at], others, scale) for at, others in confused.items()}
+    return {at: rivals for at, rivals in out.items() if rivals}
+
+
+def _sound_windows(learned: Windows, chosen: ChosenServo) -> Windows:
+    """The windows that a servo explains."""
+    return learned.select(np.setdiff1d(np.arange(learned.count), chosen.odd)).with_integral(chosen.fit.integral)
+
+
+def _rivals_by_scale(unknown_gain: bool, sound: Windows, fit: ServoFit, tuning: MotionTuning) -> tuple[str, ...]:
+    """Effects that the factor of all torques may be of. unknown_gain: whether the simulation has no kp."""
+    if has_weak_load(sound, fit.values, tuning):
+        return ("rotor_inertia", "inertial_parameter_error")
+    return ("inertial_parameter_error",) if unknown_gain else ()
+
+
+def _rivals_of(parameter: ServoParameter, others: Sequence[int], scale: tuple[str, ...]) -> tuple[str, ...]:
+    """Each effect once. others: places of parameters; scale: effects that scale all torques."""
+    confused = (PARAMETERS[other].effect for other in others)
+    scaled = scale if parameter.key in TORQUE_SCALED else ()
+    return tuple(dict.fromkeys((*parameter.rivals, *confused, *scaled)))
 
 
 def name_payload(payload: FoundNumber, fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning) -> ServoFinding:

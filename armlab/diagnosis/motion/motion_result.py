@@ -1,5 +1,6 @@
 """What a diagnosis of motion only says: plain data for the verdict, the files and the page."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -88,7 +89,8 @@ class MotionDiagnosis:
     chosen: of each joint, None for one that stands still or follows no servo. servos: all numbers for the simulation
     after. odd: stretches that a servo does not explain: run, from, to. replayed_before, replayed_after: the
     held-out runs. replayed_alone: squared errors after, of each joint alone, (stretches, joints), rad2. tool: error of
-    the tool before and after, m. currents: what those of the held-out runs say.
+    the tool before and after, m. currents: what those of the held-out runs say. rivals: of each joint, the effects that
+    its motion does not tell from a fitted number, by the number's place.
     """
 
     recording: MotionRecording
@@ -106,4 +108,5 @@ class MotionDiagnosis:
     tool: tuple[float | None, float] = (None, 0.0)
     silent: tuple[int, ...] = ()
     currents: tuple[CurrentWitness, ...] = ()
+    rivals: tuple[Mapping[int, tuple[str, ...]], ...] = ()
     seconds: float = 0.0

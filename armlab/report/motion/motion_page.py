@@ -16,6 +16,7 @@ from armlab.report.motion.motion_words import (
     finding_with_numbers,
     remarks,
     summary_of,
+    untold_numbers,
 )
 from armlab.report.motion.stated_numbers import stated_numbers
 from armlab.report.words import format_chance
@@ -54,6 +55,7 @@ def motion_page(diagnosis: MotionDiagnosis, command: str) -> str:
         findings=[*finding_phrases(diagnosis, minor=False), *finding_phrases(diagnosis, minor=True)],
         currents=[current_phrase(diagnosis.simulation.arm, each) for each in diagnosis.currents],
         numbers=_number_table(diagnosis) if known else None,
+        untold=untold_table(diagnosis),
         missing=_missing_fields(diagnosis),
         command=command,
     )
@@ -72,6 +74,16 @@ def joint_table(diagnosis: MotionDiagnosis) -> Table:
         rows.append((joint_in_table(arm, each.joint), words, sure, errors))
     headings = ("joint", "what is wrong, 95 % interval", "how sure", "replay error")
     return Table(headings, rows, (1, 2), stacked=True)
+
+
+def untold_table(diagnosis: MotionDiagnosis) -> Table:
+    """Of each joint, the fitted numbers that its motion does not tell from other effects."""
+    rows = [
+        (joint_in_table(diagnosis.simulation.arm, diagnosis.simulation.number_of(row)), *line)
+        for row, rivals in enumerate(diagnosis.rivals)
+        for line in untold_numbers(rivals)
+    ]
+    return Table(("joint", "fitted number", "this motion does not tell it from"), rows, (1, 2), stacked=True)
 
 
 def _next_recordings(diagnosis: MotionDiagnosis) -> list[str]:

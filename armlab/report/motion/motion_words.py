@@ -1,12 +1,12 @@
 """What a diagnosis of motion only says in words: the summary, and the lines on a terminal."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from textwrap import wrap
 
 from armlab.common.report.wording import count_of, format_number, format_unit, join_words
 from armlab.diagnosis.motion.motion_result import MotionDiagnosis, ReplayError, ServoFinding
-from armlab.diagnosis.motion.servo import INFINITE_LIMIT
+from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
 from armlab.diagnosis.motion.witness import CurrentWitness
 from armlab.diagnosis.torque.names.findings import FRICTION
 from armlab.effects.contract import UNKNOWN
@@ -145,7 +145,7 @@ def _odd_sentence(diagnosis: MotionDiagnosis) -> str:
 def motion_lines(diagnosis: MotionDiagnosis, verbose: bool = False) -> Iterator[str]:
     """The verdict, each finding with its interval, the simulation's number and rivals, and the errors of each joint.
 
-    verbose: minor findings and what the currents of the joints say, too.
+    verbose: minor findings, what the motion does not tell, and what the currents of the joints say, too.
     """
     arm = diagnosis.simulation.arm
     yield from wrap(f"{diagnosis.status.upper()}: {summary_of(diagnosis)}", LINE_WIDTH)
@@ -158,6 +158,9 @@ def motion_lines(diagnosis: MotionDiagnosis, verbose: bool = False) -> Iterator[
         yield f"  {count_of(len(minor), 'small difference')} more, in verdict.json and on the page"
     for error in diagnosis.errors:
         yield f"  {error_phrase(arm, error)}"
+    for row, rivals in enumerate(diagnosis.rivals if verbose else ()):
+        joint = joint_in_words(arm, diagnosis.simulation.number_of(row))
+        yield from (f"  not told at {joint}: {each} from {others}" for each, others in untold_numbers(rivals))
     for current in diagnosis.currents if verbose else ():
         yield f"  {current_phrase(arm, current)}"
 
@@ -170,10 +173,22 @@ def finding_phrases(diagnosis: MotionDiagnosis, minor: bool) -> list[str]:
 
 def _finding_phrase(arm: Arm, stated: StatedNumber) -> str:
     finding = stated.finding
-    rivals = " or ".join(effect_named(each).words for each in finding.rivals)
-    also = f"; it could also be {rivals}" if rivals else ""
+    also = f"; it could also be {_effects_in_words(finding.rivals)}" if finding.rivals else ""
     chance = format_chance(stated.naming.probability_of(finding.effect, finding.joint))
     return f"{_places(arm, [finding])}: {finding_with_numbers(finding)}; probability of the name {chance}{also}"
+
+
+def _effects_in_words(effects: Sequence[str]) -> str:
+    return " or ".join(effect_named(each).words for each in effects)
+
+
+def untold_numbers(rivals: Mapping[int, tuple[str, ...]]) -> list[tuple[str, str]]:
+    """Each fitted number of a joint that the motion does not tell from other effects, and these effects, in words."""
+    known = ((PARAMETERS[at], effects) for at, effects in rivals.items())
+    return [
+        (f"{effect_named(number.effect).words}{NUMBER_WORDS.get(number.name, '')}", _effects_in_words(effects))
+        for number, effects in known
+    ]
 
 
 def finding_with_numbers(finding: ServoFinding) -> str:
