@@ -84,19 +84,27 @@ def _joint_error(model: TorqueModel, joint: int, left: Array, torque: Array) -> 
 
 
 def error_table(errors: tuple[RunError, ...]) -> str:
-    """A table in plain text; its first line says which torque the joints' errors are of."""
+    """A table in plain text; its first line says which torque the joints' errors are of.
+
+    Plain least squares has a column where it was asked.
+    """
+    beside = any(joint.percent_plain is not None for each in errors for joint in each.joints)
+    plain_heading = "  plain %" if beside else ""
     lines = [
         f"errors of torque {filter_of_errors(errors)}:",
-        "run                   role      joint   rms N m  % of torque  plain %  % of rated",
+        f"run                   role      joint   rms N m  % of torque{plain_heading}  % of rated",
     ]
     for each in errors:
         for joint in each.joints:
-            shares = joint.percent, joint.percent_plain, joint.percent_rated
-            percent, plain, rated = ("-" if each is None else f"{each:.2f}" for each in shares)
-            name = f"{each.run:<21} {each.role:<9}"
-            lines.append(f"{name} {joint.joint:5d} {joint.rms:9.4g} {percent:>12} {plain:>8} {rated:>11}")
+            percent, plain, rated = map(_share, (joint.percent, joint.percent_plain, joint.percent_rated))
+            start = f"{each.run:<21} {each.role:<9} {joint.joint:5d} {joint.rms:9.4g} {percent:>12}"
+            lines.append(f"{start}{f' {plain:>8}' if beside else ''} {rated:>11}")
         lines.append(total_error_line(each))
     return "\n".join(lines)
+
+
+def _share(percent: float | None) -> str:
+    return "-" if percent is None else f"{percent:.2f}"
 
 
 def total_error_line(error: RunError) -> str:

@@ -124,6 +124,9 @@ def test_identification_and_prediction_answer_in_json(folder):
     assert [each["role"] for each in found["errors"]] == ["identify", "validate"]
     assert all(Path(file).is_file() for file in found["files"])
     predicted = document("predict", "out/model.yaml", folder)
+    plain = [joint.pop("percent_plain") for each in found["errors"] for joint in each["joints"]]
+    assert all(share > 0 for share in plain)
+    assert not any(joint.pop("percent_plain") for each in predicted["errors"] for joint in each["joints"])
     assert predicted["errors"] == found["errors"]
     load = document("payload", folder, "--without", folder, "--link", 3, "--centre", 0, 0, 0.1)
     assert load["parameters"]["m"]["ci95"][0] <= load["parameters"]["m"]["value"]
