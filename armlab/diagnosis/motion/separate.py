@@ -29,6 +29,8 @@ def confused_parameters(
     slopes = jacobian(windows, fit.values, every)
     columns = dict(zip(np.flatnonzero(every).tolist(), slopes.T, strict=True))
     fitted = np.flatnonzero(fit.free & every).tolist()  # a limit that never acts has no slope
+    if not fitted:
+        return {}
     alone = _inverse([columns[number] for number in fitted])
     found: dict[int, list[int]] = {number: [] for number in fitted}
     for first in range(len(fitted)):
