@@ -474,7 +474,7 @@ class PlausibilityTuning:
         0.5,
         "what structure without a name could be of a link or load that is known",
         "of the torque of the link or load",
-        source="the KUKA's single runs: where an unnamed spring is as large, the load is off by half",
+        source="convention: a load of which half may be something else is not known",
     )
 
 

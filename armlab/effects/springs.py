@@ -34,8 +34,8 @@ from problem.regressor import rigid_body_torque
 
 RESTS_SEEN = Range(
     (-2 * np.pi, 2 * np.pi),
-    "no joint of an arm turns further; a torque that vanishes there alone is constant",
-    (-5.0, 5.0),
+    "a turn to each side, the range of the joints of the UR arms: a pull that ends beyond it is nearly constant",
+    (-np.inf, np.inf),
 )
 
 TORQUE_RIPPLE_FACTS = Effect(

@@ -34,11 +34,12 @@ class IdentifierChoice:
     """An identifier that is not fitted yet, and why it was chosen.
 
     cost: by how much the errors of the best consistent model are larger on the blocks, a share; None where there is
-    none.
+    none. stopped: why no consistent model was found.
     """
 
     identifier: Identifier
     cost: float | None
+    stopped: str = ""
 
     @property
     def sentence(self) -> str:
@@ -47,7 +48,8 @@ class IdentifierChoice:
         if self.identifier.method == CONSISTENT:
             return f"{manner}: on blocks of the runs that identify, none predicts better by more than chance or 1 %"
         if self.cost is None:
-            return f"{manner}, which predicts best on blocks of the runs that identify; no consistent model was found"
+            best = f"{manner}, which predicts best on blocks of the runs that identify"
+            return f"{best}; no physically consistent model was compared: {self.stopped}"
         return (
             f"{manner}, which predicts best on blocks of the runs that identify; there a physically consistent model "
             f"errs {100 * self.cost:.0f} % more (--method {CONSISTENT})"
@@ -60,30 +62,36 @@ def choose_identifier(arm: Arm, runs: Sequence[Run], cutoff_hz: float, robot: st
     robot: the robot file, as in `Identifier`. Raises ValueError for runs that do not fit the arm.
     """
     held_out = HeldOutBlocks.of(runs).up_to(cutoff_hz)
-    scored = list(_scored(arm, held_out, cutoff_hz, robot))
+    stopped = list[str]()
+    scored = list(_scored(arm, held_out, cutoff_hz, robot, stopped))
     best, best_scores = min(scored, key=lambda each: float(np.mean(each[1])))
     consistent = [each for each in scored if each[0].method == CONSISTENT]
     if not consistent:
-        return IdentifierChoice(best, None)
+        return IdentifierChoice(best, None, stopped[0])
     chosen, scores = min(consistent, key=lambda each: float(np.mean(each[1])))
     beyond = scores - best_scores
     within = np.mean(beyond) <= max(np.std(beyond, ddof=1) / np.sqrt(len(beyond)), MIN_GAIN)
     return IdentifierChoice(chosen if within else best, float(np.exp(np.mean(beyond)) - 1))
 
 
-def _scored(arm: Arm, held_out: HeldOutBlocks, cutoff_hz: float, robot: str) -> Iterator[tuple[Identifier, Array]]:
-    """Identifiers with their scores on each block, (blocks,)."""
+def _scored(
+    arm: Arm, held_out: HeldOutBlocks, cutoff_hz: float, robot: str, stopped: list[str]
+) -> Iterator[tuple[Identifier, Array]]:
+    """Identifiers with their scores on each block, (blocks,). stopped: takes what stopped the others."""
     usual = Identifier(arm, usual_components(arm), cutoff_hz=cutoff_hz, robot=robot)
     top_speed = fastest_speeds(usual.prepare(held_out.runs)[1])
     for friction in (usual.components, usual_components(arm, top_speed)):
         free = replace(usual, components=friction)
-        yield from _scored_alike([free, replace(free, method="excited"), replace(free, method=CONSISTENT)], held_out)
+        alike = [free, replace(free, method="excited"), replace(free, method=CONSISTENT)]
+        yield from _scored_alike(alike, held_out, stopped)
         if arm.links is not None:
-            yield from _scored_alike([replace(free, pull=Pull("nominal", WIDE_TOLERANCE))], held_out)
+            yield from _scored_alike([replace(free, pull=Pull("nominal", WIDE_TOLERANCE))], held_out, stopped)
 
 
-def _scored_alike(identifiers: Sequence[Identifier], held_out: HeldOutBlocks) -> Iterator[tuple[Identifier, Array]]:
-    """Scores of identifiers of the same columns; without those that a solver or a missing package stops."""
+def _scored_alike(
+    identifiers: Sequence[Identifier], held_out: HeldOutBlocks, stopped: list[str]
+) -> Iterator[tuple[Identifier, Array]]:
+    """Scores of identifiers of the same columns; a solver or a missing package may stop that of consistent bodies."""
     fitted = identifiers[0].prepare(held_out.runs)
     structure, signals, data = fitted
     block = np.concatenate([own[each.filter.rows] for own, each in zip(held_out.blocks, signals, strict=True)])
@@ -91,7 +99,10 @@ def _scored_alike(identifiers: Sequence[Identifier], held_out: HeldOutBlocks) ->
         estimator = METHODS[each.method](fitted, each.pull)
         try:
             values = {number: estimator(data.rows(block != number)).values for number in held_out.numbers}
-        except (InputError, RuntimeError):
+        except (InputError, RuntimeError) as error:
+            if each.method != CONSISTENT:
+                raise
+            stopped.append(str(error))
             continue
         models = {number: TorqueModel("", structure, own) for number, own in values.items()}
 

@@ -17,7 +17,7 @@ from armlab.common.errors import InputError
 from armlab.common.report.wording import format_number
 from armlab.effects.parameters import ParameterValue
 from armlab.identification.estimators.least_squares import EXCITED_TOLERANCE, WeightedLeastSquares
-from armlab.identification.identifier import Identifier
+from armlab.identification.identifier import METHODS, Identifier
 from armlab.identification.identifier_choice import choose_identifier
 from armlab.identification.identify import overfit_warnings
 from armlab.identification.model import Model
@@ -193,6 +193,17 @@ def test_an_arm_without_links_has_no_prior() -> None:
     model = structure()
     short = run(model, truth(model), 0, noise=3.0, seconds=1.5)
     assert choose_identifier(bare, [short], 10.0, "bare").identifier.pull == NO_PULL
+
+
+def test_why_no_consistent_model_was_compared_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stopped(*_: object) -> None:
+        raise InputError("bodies that can exist need a package")
+
+    monkeypatch.setitem(METHODS, "physical", lambda fitted, pull: stopped)
+    model = structure()
+    choice = choose_identifier(arm(), [run(model, truth(model), 0, noise=0.05, seconds=5.0)], 10.0, "irb120-arm")
+    assert choice.cost is None
+    assert choice.sentence.endswith("no physically consistent model was compared: bodies that can exist need a package")
 
 
 def total(model: Model, other: Run) -> float:

@@ -147,9 +147,9 @@ def links_that_data_tell(
 def reason_link_unknown(claim: Claim, left: Sequence[Structure], noise: Array, tuning: Tuning) -> str | None:
     """Why these data do not tell of a claim about a link or its load; None where they do, and for other claims.
 
-    noise: (joints,), N m, what is left at each joint beside structure: a joint tells of the claim by the square of the
-    torque that it feels over that. Structure can be taken for so much of the claim at most as it is of that torque,
-    times the joint's share in all that joints tell.
+    noise: (joints,), N m, what is left at each joint beside structure. A joint tells of the claim by the square of its
+    torque over the noise, and its share in what all joints tell is its weight. Structure could be so much of the claim:
+    its size over that torque, times the weight of its joint.
     """
     if claim.candidate is None or claim.candidate.facts.where != "link":
         return None
@@ -164,7 +164,7 @@ def reason_link_unknown(claim: Claim, left: Sequence[Structure], noise: Array, t
         unnamed = float(np.std(each.prediction) / noise[each.joint])
         share = float(unnamed * felt[each.joint] / (felt @ felt))
         if share > tuning.plausibility.max_unknown_share:
-            return f"what is left without a name at joint {each.joint + 1} could be {share:.2g} of it"
+            return f"what is left without a name at joint {each.joint + 1} could be {share:.0%} of it"
     return None
 
 
