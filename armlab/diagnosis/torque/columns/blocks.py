@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 from armlab.common.arrays import Array
 from armlab.common.probabilities import fisher_tail, student_tail
 from armlab.diagnosis.torque.columns.columns import Columns
+from armlab.diagnosis.torque.columns.inverses import pseudo_inverse_of
 from armlab.diagnosis.torque.columns.solver import Fit
 from armlab.diagnosis.torque.rows.data import Observed
 from armlab.diagnosis.torque.rows.noise import Noise
@@ -126,7 +127,7 @@ def block_covariance(
     own = np.arange(len(precision)) if chosen is None else np.asarray(chosen, dtype=np.intp)
     precision = precision[np.ix_(own, own)]
     gram = gram[np.ix_(own, own)] + precision
-    inverse = np.linalg.pinv(gram, rcond=1e-12, hermitian=True)
+    inverse = pseudo_inverse_of(gram)
     count = len(np.unique(np.concatenate(rows.blocks)))
     degrees = float(max(count - 1, 1))
     variance = sum(float(error @ error) for error in rows.errors) / max(sum(map(len, rows.errors)) - len(gram), 1)
@@ -155,11 +156,15 @@ def variance_inflation(shape: Array, errors: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Folds:
-    """Whitened rows of a wide fit, cut into folds of whole stretches of time. precision: of the parameters' prior."""
+    """Whitened rows of a wide fit, cut into folds of whole stretches of time. precision: of the parameters' prior.
+
+    parts: of each joint, fold by fold, the numbers of its rows and their design.
+    """
 
     rows: WhitenedRows
     targets: tuple[Array, ...]
     precision: Array
+    parts: tuple[tuple[tuple[NDArray[np.intp], Array], ...], ...]
     grams: tuple[Array, ...]
     products: tuple[Array, ...]
 
@@ -179,7 +184,7 @@ class Folds:
         towards = np.sum(self.products, axis=0)
         for fold in range(count):
             gram = (self.whole - self.grams[fold] + self.precision)[place]
-            inverse = np.linalg.pinv(gram, rcond=1e-12, hermitian=True)
+            inverse = pseudo_inverse_of(gram)
             values[chosen, fold] = inverse @ (towards - self.products[fold])[chosen]
         return values
 
@@ -189,23 +194,27 @@ class Folds:
 
     def errors_at(self, joint: int, values: Array) -> Array:
         """The same at one joint (from 0)."""
-        block, predicted = self.rows.blocks[joint], self.rows.designs[joint] @ values
-        return np.asarray(self.targets[joint] - predicted[np.arange(len(block)), block % len(self.grams)])
+        out = self.targets[joint].copy()
+        for (own, design), solution in zip(self.parts[joint], values.T, strict=True):
+            out[own] -= design @ solution
+        return out
 
 
 def split_folds(rows: WhitenedRows, values: Array, precision: Array, count: int) -> Folds:
     """Some folds of a fit's rows; values: its parameters, to give the errors back what they explain."""
     targets = tuple(error + design @ values for error, design in zip(rows.errors, rows.designs, strict=True))
+    parts = tuple(
+        tuple((own, design[own]) for own in (np.flatnonzero(block % count == fold) for fold in range(count)))
+        for design, block in zip(rows.designs, rows.blocks, strict=True)
+    )
     grams, products = [], []
     for fold in range(count):
-        gram, product = np.zeros(precision.shape), np.zeros(len(values))
-        for target, design, block in zip(targets, rows.designs, rows.blocks, strict=True):
-            own = block % count == fold
-            gram += design[own].T @ design[own]
-            product += design[own].T @ target[own]
-        grams.append(gram)
-        products.append(product)
-    return Folds(rows, targets, precision, tuple(grams), tuple(products))
+        own = [each[fold] for each in parts]
+        grams.append(np.sum([design.T @ design for _, design in own], axis=0))
+        products.append(
+            np.sum([design.T @ target[at] for target, (at, design) in zip(targets, own, strict=True)], axis=0)
+        )
+    return Folds(rows, targets, precision, parts, tuple(grams), tuple(products))
 
 
 @dataclass(frozen=True)
@@ -227,7 +236,7 @@ def held_out_gain(without: Array, with_it: Array, blocks: NDArray[np.intp]) -> H
     What is left times what is predicted is how far chance carries the gain, stretch by stretch; as many stretches
     count as share the prediction's power.
     """
-    predicted, places = without - with_it, np.unique(blocks)
+    predicted, places = without - with_it, np.flatnonzero(np.bincount(blocks))
     better = np.bincount(blocks, without**2 - with_it**2)[places]
     power = np.bincount(blocks, predicted**2)[places]
     carried = np.bincount(blocks, with_it * predicted)[places]

@@ -11,10 +11,11 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import solve_triangular
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.torque.columns.columns import Group, Moments
+from armlab.diagnosis.torque.columns.inverses import inverse_of
 from armlab.diagnosis.torque.columns.links import LinkPrior, Widths
 from armlab.diagnosis.tuning import SolverTuning
 from armlab.effects.contract import Candidate
@@ -77,6 +78,7 @@ class Solver:
 
     places: number of places that are looked at, the factor of the correction. scales: of each group's coefficients.
     simulated: the coefficients that the simulation has of each group's law already, to which what is fitted adds.
+    flexible_gains: what surrogates explain of states at joints, kept for who asks again (`flexible_gain`).
     """
 
     def __init__(
@@ -96,6 +98,8 @@ class Solver:
         self._links: dict[Widths | None, LinkColumns] = {}
         self._fits: dict[State, Fit] = {}  # those that were asked for last
         self._held: dict[State, Fit] = {}
+        self.flexible_gains: dict[tuple[State, int], float] = {}
+        self._rests: tuple[State, dict[int, tuple[Array, Array]]] | None = None  # of the state that was asked for last
         self._contained: dict[int, tuple[int, ...]] = {}
 
     def _precisions(self, scales: Sequence[float]) -> Array:
@@ -196,8 +200,10 @@ class Solver:
 
     def fit(self, state: State) -> Fit:
         """The fit of a state, kept for the next question."""
-        if state in self._held:
-            return self._held[state]
+        return self._held.get(state) or self.free_fit(state)
+
+    def free_fit(self, state: State) -> Fit:
+        """The fit of a state that no constraint holds."""
         fit = self._fits.pop(state, None) or self._fitted(state)
         self._fits[state] = fit  # as the last one
         if len(self._fits) > MAX_KEPT_FITS:
@@ -209,7 +215,8 @@ class Solver:
 
         Scores and covariances are those of the free fit, the chi-square that of these coefficients.
         """
-        free, gram = self.fit(state), self.moments.gram
+        self.flexible_gains.clear()
+        free, gram = self.free_fit(state), self.moments.gram
         chi_square = float(2 * coefficients @ gram[:-1, -1] - coefficients @ gram[:-1, :-1] @ coefficients)
         score = free.score - max(free.chi_square - chi_square, 0.0) / 2
         self._held[state] = replace(free, coefficients=coefficients, chi_square=chi_square, score=score)
@@ -242,8 +249,8 @@ class Solver:
         coefficients = np.zeros(self.moments.size)
         chi_square, inverse = 0.0, np.empty((0, 0))
         if len(matrix):
-            inverse = cho_solve(cho_factor(matrix, lower=True), np.eye(len(matrix)))
-            towards = self.products(state)[:, -1]
+            inverse = inverse_of(matrix)
+            towards = np.concatenate([links.products[:, -1], self.moments.gram[columns, -1]])
             solution = inverse @ towards
             chi_square = float(solution @ towards)
             rank = factor.shape[1]
@@ -254,16 +261,40 @@ class Solver:
         score = 0.5 * chi_square - price
         return Fit(state, coefficients, score, chi_square, columns, factor, inverse)
 
-    def gains(self, state: State) -> Array:
-        """How much each group would raise the score, were it added: (groups,)."""
-        matrix, products = self.system(state)[0], self.products(state)
-        whole = np.zeros((0, self.moments.size + 1))
-        if len(matrix):
-            whole = solve_triangular(np.linalg.cholesky(matrix), products, lower=True)
-        out = np.empty(len(self.groups))
+    def gains(self, state: State, but: int | None = None) -> Array:
+        """How much each group would raise the score, were it added: (groups,). but: a group of the state to go without.
+
+        With W what the state makes of all columns and A the part of its covariance that belongs to the group, the
+        columns that are left without it have the products W' A^-1 W more.
+        """
+        if self._rests is None or self._rests[0] != state:
+            self._rests = state, self._what_is_left(state)
+        rests, out, more = self._rests[1], np.empty(len(self.groups)), None
+        if but is not None:
+            more, state = self._of_group(state, but), state.minus(but)
         for width, (numbers, offered) in self._by_width.items():
-            out[numbers] = self._gains(whole, offered, width)
+            rest, towards = rests[width]
+            if more is not None:
+                part = more[:, offered]  # (columns of `but`, groups, width)
+                rest = rest + np.einsum("rgi,rgj->gij", part, part)
+                towards = towards + np.einsum("rgi,r->gi", part, more[:, -1])
+            out[numbers] = self._gains(rest, towards)
         return out - self.prices - self.tuning.crowd_penalty * self.crowd(state.groups) * self.unusual
+
+    def _of_group(self, state: State, group: int) -> Array:
+        """Rows whose products are what a state's columns explain with a group and not without it."""
+        fit, links = self.fit(state), self.links(state.widths)
+        place, rank = self._place(fit, group), len(links.own)
+        weights = (
+            fit.inverse[place, :rank] @ links.products + fit.inverse[place, rank:] @ self.moments.gram[fit.columns]
+        )
+        return np.asarray(solve_triangular(np.linalg.cholesky(fit.inverse[place, place]), weights, lower=True))
+
+    def _place(self, fit: Fit, group: int) -> slice:
+        """Where a group's coefficients stand in a fit's covariance."""
+        columns = self.groups[group].columns
+        at = fit.links.shape[1] + int(np.flatnonzero(fit.columns == columns[0])[0])
+        return slice(at, at + len(columns))
 
     @cached_property
     def _by_width(self) -> dict[int, tuple[NDArray[np.intp], NDArray[np.intp]]]:
@@ -275,15 +306,23 @@ class Solver:
             for width, numbers in widths.items()
         }
 
-    def _gains(self, whole: Array, columns: NDArray[np.intp], width: int) -> Array:
-        """Half the chi-square that each group (groups, width) adds beyond what the rows of `whole` explain."""
-        gram = self.moments.gram
-        part = whole[:, columns]  # (rows, groups, width)
-        rest = gram[columns[:, :, None], columns[:, None, :]] - np.einsum("rgi,rgj->gij", part, part)
-        rest = rest + self.precisions[columns][:, :, None] * np.eye(width)
-        towards = gram[columns, -1] - np.einsum("rgi,r->gi", part, whole[:, -1])
+    def _what_is_left(self, state: State) -> dict[int, tuple[Array, Array]]:
+        """Products of groups, (groups, width, width), and with the torque, less what a state explains, by width."""
+        matrix, gram, out = self.system(state)[0], self.moments.gram, {}
+        whole = np.zeros((0, self.moments.size + 1))
+        if len(matrix):
+            whole = solve_triangular(np.linalg.cholesky(matrix), self.products(state), lower=True)
+        for width, (_, offered) in self._by_width.items():
+            part = whole[:, offered]  # (rows, groups, width)
+            rest = gram[offered[:, :, None], offered[:, None, :]] - np.einsum("rgi,rgj->gij", part, part)
+            rest += self.precisions[offered][:, :, None] * np.eye(width)
+            out[width] = rest, gram[offered, -1] - np.einsum("rgi,r->gi", part, whole[:, -1])
+        return out
+
+    def _gains(self, rest: Array, towards: Array) -> Array:
+        """Half the chi-square that each group adds with these products of its columns."""
         # what is absorbed counts for nothing: the ridge bounds it
-        bounded = rest + self.tuning.min_unabsorbed_share * np.eye(width)
+        bounded = rest + self.tuning.min_unabsorbed_share * np.eye(rest.shape[-1])
         solved = np.linalg.solve(bounded, towards[:, :, None])[:, :, 0]
         return np.asarray(0.5 * np.sum(towards * solved, axis=1))
 
@@ -302,11 +341,8 @@ class Solver:
 
     def covariance(self, fit: Fit, group: int) -> Array:
         """Covariance of a group's coefficients, in units of its unscaled columns."""
-        columns = self.groups[group].columns
-        at = fit.links.shape[1] + int(np.flatnonzero(fit.columns == columns[0])[0])
-        block = fit.inverse[at : at + len(columns), at : at + len(columns)]
-        lengths = self.moments.lengths[columns]
-        return np.asarray(block / np.outer(lengths, lengths))
+        place, lengths = self._place(fit, group), self.moments.lengths[self.groups[group].columns]
+        return np.asarray(fit.inverse[place, place] / np.outer(lengths, lengths))
 
     def values(self, fit: Fit, group: int) -> Array:
         """A group's coefficients of unscaled columns."""

@@ -121,9 +121,12 @@ class FitOfAll:
 
 def flexible_gain(model: FittedModel, state: State, joint: int) -> float:
     """What the best surrogate explains of what a state leaves at a joint (from 0): see `Structure.gain`."""
-    beside = replace(model, state=state)
-    features = _features_of(beside, joint, _load(beside))
-    return max(each.gain for each in _surrogates(beside, joint, features, model.noise))
+    known = model.solver.flexible_gains
+    if (state, joint) not in known:
+        beside = replace(model, state=state)
+        features = _features_of(beside, joint, _load(beside))
+        known[state, joint] = max(each.gain for each in _surrogates(beside, joint, features, model.noise))
+    return known[state, joint]
 
 
 def is_structured(each: Structure, tuning: Tuning) -> bool:

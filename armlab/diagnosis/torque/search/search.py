@@ -122,7 +122,7 @@ class Search:
 
     def _forward(self, state: State) -> Iterator[tuple[str, State]]:
         crowded = self.solver.crowd(state.groups) >= self.tuning.max_unusual_effects
-        added = None if crowded else self._addition(state)
+        added = None if crowded else self._addition(state, self.gains(state))
         if added is not None:
             yield f"+ {self._name(added)}", self.with_group(state, added)
 
@@ -174,13 +174,12 @@ class Search:
         limits = [limit for each in facts for limit in each.at_most_beside.items()]
         return any(present.count(effect) > count for effect, count in limits)
 
-    def _addition(self, state: State, but: int | None = None) -> int | None:
-        """The group that raises the score most and breaks no law of physics."""
-        gains = self.gains(state)
-        asked = 0
+    def _addition(self, state: State, gains: Array, least: float = 0.0, but: int | None = None) -> int | None:
+        """The group of the largest of some gains, if it is above the least, that breaks no law of physics."""
+        least, asked = max(least, self.tuning.min_score_step), 0
         for group in np.argsort(-gains):
             number = int(group)
-            if gains[number] <= self.tuning.min_score_step or asked >= self.tuning.max_candidates_asked:
+            if gains[number] <= least or asked >= self.tuning.max_candidates_asked:
                 return None
             if number == but or number in self.banned or self.excluded(state, number):
                 continue
@@ -189,11 +188,11 @@ class Search:
                 return number
         return None
 
-    def gains(self, state: State) -> Array:
-        """Gain of each group, with the price of what it replaces given back."""
-        solver, present = self.solver, list(state.groups)
+    def gains(self, state: State, but: int | None = None) -> Array:
+        """Gain of each group, with the price of what it replaces given back. but: of the state, to go without."""
+        solver, present = self.solver, [each for each in state.groups if each != but]
         given_back = solver.prices[present] + solver.tuning.crowd_penalty * solver.unusual[present]
-        return np.asarray(solver.gains(state) + solver.replaces[:, present] @ given_back)
+        return np.asarray(solver.gains(state, but) + solver.replaces[:, present] @ given_back)
 
     def not_taken(self, state: State) -> Iterator[NotTaken]:
         """Each effect at each place that a state does not hold, with what it would add to the score."""
@@ -226,9 +225,12 @@ class Search:
     def _exchanges(self, state: State) -> Iterator[tuple[str, State]]:
         if not self.settings.guards.backward_elimination:
             return
+        enough = self.solver.fit(state).score + self.tuning.min_score_step
+        gains = {group: self.gains(state, group) for group in state.groups}
         for group in state.groups:
             for without in self._without(state, group):
-                added = self._addition(without, group)
+                own = gains[group] if without == state.minus(group) else self.gains(without)
+                added = self._addition(without, own, enough - self.solver.free_fit(without).score, group)
                 if added is not None:
                     yield f"{self._name(group)} -> {self._name(added)}", self.with_group(without, added)
 
