@@ -22,6 +22,8 @@ def pseudo_inverse_of(matrix: Array) -> Array:
     No eigenvalue is rounding where the condition in the 1-norm, which is no better than that of the eigenvalues, says
     so; an eigendecomposition takes five times as long.
     """
+    if not len(matrix):
+        return matrix
     factor, failed = dpotrf(matrix, lower=1)
     if not failed and dpocon(factor, np.linalg.norm(matrix, 1), uplo="L")[0] > LEAST_RATIO:
         return _inverse_from(factor)

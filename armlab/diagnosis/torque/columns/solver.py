@@ -21,8 +21,7 @@ from armlab.diagnosis.tuning import SolverTuning
 from armlab.effects.contract import Candidate
 
 MAX_OVERSHOOT = 0.1  # of a law of the simulation, by which a finding may take off more than all of it (chosen by eye)
-
-
+ROUNDING = 1e-9  # of the squared length of a column
 MAX_KEPT_FITS = 500  # of a solver: of seven joints each takes 50 kB, and 2 % more are fitted anew than with any more
 
 
@@ -264,6 +263,17 @@ class Solver:
     def gains(self, state: State, but: int | None = None) -> Array:
         """How much each group would raise the score, were it added: (groups,). but: a group of the state to go without.
 
+        What is absorbed by others counts for nothing.
+        """
+        return self._gains(state, but, self.tuning.min_unabsorbed_share)
+
+    def gains_at_most(self, state: State, but: int | None = None) -> Array:
+        """The same, no less than what a fit finds: what is absorbed counts."""
+        return self._gains(state, but, ROUNDING)
+
+    def _gains(self, state: State, but: int | None, ridge: float) -> Array:
+        """ridge: of columns of unit length.
+
         With W what the state makes of all columns and A the part of its covariance that belongs to the group, the
         columns that are left without it have the products W' A^-1 W more.
         """
@@ -278,7 +288,8 @@ class Solver:
                 part = more[:, offered]  # (columns of `but`, groups, width)
                 rest = rest + np.einsum("rgi,rgj->gij", part, part)
                 towards = towards + np.einsum("rgi,r->gi", part, more[:, -1])
-            out[numbers] = self._gains(rest, towards)
+            solved = np.linalg.solve(rest + ridge * np.eye(width), towards[:, :, None])[:, :, 0]
+            out[numbers] = 0.5 * np.sum(towards * solved, axis=1)
         return out - self.prices - self.tuning.crowd_penalty * self.crowd(state.groups) * self.unusual
 
     def _of_group(self, state: State, group: int) -> Array:
@@ -318,13 +329,6 @@ class Solver:
             rest += self.precisions[offered][:, :, None] * np.eye(width)
             out[width] = rest, gram[offered, -1] - np.einsum("rgi,r->gi", part, whole[:, -1])
         return out
-
-    def _gains(self, rest: Array, towards: Array) -> Array:
-        """Half the chi-square that each group adds with these products of its columns."""
-        # what is absorbed counts for nothing: the ridge bounds it
-        bounded = rest + self.tuning.min_unabsorbed_share * np.eye(rest.shape[-1])
-        solved = np.linalg.solve(bounded, towards[:, :, None])[:, :, 0]
-        return np.asarray(0.5 * np.sum(towards * solved, axis=1))
 
     def losses(self, fit: Fit) -> dict[int, float]:
         """How much the score changes where a group of the model is taken out."""

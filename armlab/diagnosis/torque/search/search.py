@@ -174,25 +174,30 @@ class Search:
         limits = [limit for each in facts for limit in each.at_most_beside.items()]
         return any(present.count(effect) > count for effect, count in limits)
 
-    def _addition(self, state: State, gains: Array, least: float = 0.0, but: int | None = None) -> int | None:
-        """The group of the largest of some gains, if it is above the least, that breaks no law of physics."""
-        least, asked = max(least, self.tuning.min_score_step), 0
+    def _addition(self, state: State, gains: Array, but: int | None = None) -> int | None:
+        """The group of the largest of some gains that breaks no law of physics. but: one that may not be added."""
+        asked = 0
         for group in np.argsort(-gains):
             number = int(group)
-            if gains[number] <= least or asked >= self.tuning.max_candidates_asked:
+            if gains[number] <= self.tuning.min_score_step or asked >= self.tuning.max_candidates_asked:
                 return None
-            if number == but or number in self.banned or self.excluded(state, number):
-                continue
-            asked += 1
-            if self.objection(self.with_group(state, number), number) is None:
-                return number
+            if self._may_add(state, number, but):
+                asked += 1
+                if self.objection(self.with_group(state, number), number) is None:
+                    return number
         return None
+
+    def _may_add(self, state: State, group: int, but: int | None) -> bool:
+        return group != but and group not in self.banned and not self.excluded(state, group)
 
     def gains(self, state: State, but: int | None = None) -> Array:
         """Gain of each group, with the price of what it replaces given back. but: of the state, to go without."""
+        return np.asarray(self.solver.gains(state, but) + self._given_back(state, but))
+
+    def _given_back(self, state: State, but: int | None) -> Array:
         solver, present = self.solver, [each for each in state.groups if each != but]
-        given_back = solver.prices[present] + solver.tuning.crowd_penalty * solver.unusual[present]
-        return np.asarray(solver.gains(state, but) + solver.replaces[:, present] @ given_back)
+        prices = solver.prices[present] + solver.tuning.crowd_penalty * solver.unusual[present]
+        return np.asarray(solver.replaces[:, present] @ prices)
 
     def not_taken(self, state: State) -> Iterator[NotTaken]:
         """Each effect at each place that a state does not hold, with what it would add to the score."""
@@ -225,14 +230,21 @@ class Search:
     def _exchanges(self, state: State) -> Iterator[tuple[str, State]]:
         if not self.settings.guards.backward_elimination:
             return
-        enough = self.solver.fit(state).score + self.tuning.min_score_step
-        gains = {group: self.gains(state, group) for group in state.groups}
-        for group in state.groups:
-            for without in self._without(state, group):
-                own = gains[group] if without == state.minus(group) else self.gains(without)
-                added = self._addition(without, own, enough - self.solver.free_fit(without).score, group)
+        places = [(group, without) for group in state.groups for without in self._without(state, group)]
+        alone = [(group, without, state, group) for group, without in places if without == state.minus(group)]
+        others = [(group, without, without, None) for group, without in places if without != state.minus(group)]
+        for group, without, whole, but in (*alone, *others):  # where only the group is gone, all from one fit
+            if self._may_raise(state, without, whole, but, group):
+                added = self._addition(without, self.gains(whole, but), group)
                 if added is not None:
                     yield f"{self._name(group)} -> {self._name(added)}", self.with_group(without, added)
+
+    def _may_raise(self, state: State, without: State, whole: State, but: int | None, group: int) -> bool:
+        """Whether any group could raise the score of a state enough in the place of one."""
+        least = self.solver.fit(state).score + self.tuning.min_score_step - self.solver.free_fit(without).score
+        most = self.solver.gains_at_most(whole, but) + self._given_back(whole, but)
+        enough = map(int, np.flatnonzero(most > least))
+        return any(self._may_add(without, each, group) for each in enough)
 
     def _without(self, state: State, group: int) -> list[State]:
         """The state without a group; with the usual friction that it contained; without the joint's friction at all."""
