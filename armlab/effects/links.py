@@ -75,10 +75,11 @@ def felt_parameters(arm: Arm, link: int) -> tuple[tuple[int, ...], tuple[int, ..
     return tuple(felt), clear
 
 
-def felt_values(arm: Arm, link: int, ten: Array) -> Array:
-    """Values of the felt parameters that act like all ten (10,)."""
+@lru_cache(maxsize=64)
+def felt_by_ten(arm: Arm, link: int) -> Array:
+    """What each of all ten parameters adds to the values of the felt ones that act like them, (felt, 10)."""
     matrix, (felt, _) = _link_columns(arm, link), felt_parameters(arm, link)
-    return np.asarray(np.linalg.lstsq(matrix[:, list(felt)], matrix @ ten)[0])
+    return np.asarray(np.linalg.lstsq(matrix[:, list(felt)], matrix)[0])
 
 
 def _link_columns(arm: Arm, link: int) -> Array:
@@ -171,7 +172,7 @@ class Body(LinkTerm):
         ten[0] += float(parameters.get("mass", 0.0))
         ten[1:4] += ten[0] * np.array(parameters.get("centre", np.zeros(3)))
         ten[4:] += np.array(parameters.get("inertia", np.zeros(6)))
-        return cls.at(arm, joints[0]), felt_values(arm, joints[0], ten)
+        return cls.at(arm, joints[0]), felt_by_ten(arm, joints[0]) @ ten
 
 
 @dataclass(frozen=True)

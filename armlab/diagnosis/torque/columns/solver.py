@@ -237,9 +237,10 @@ class Solver:
         matrix[at, at] += self.precisions[columns]
         return matrix, columns
 
-    def products(self, state: State) -> Array:
-        """Products of what a state has in its normal equations with all columns and the torque."""
-        return np.vstack([self.links(state.widths).products, self.moments.gram[self._columns(state)]])
+    def products(self, state: State, columns: NDArray[np.intp] | slice = slice(None)) -> Array:
+        """Products of what a state has in its normal equations with columns, all by default, the torque the last."""
+        links = self.links(state.widths).products[:, columns]
+        return np.vstack([links, self.moments.gram[self._columns(state)][:, columns]])
 
     def _fitted(self, state: State) -> Fit:
         matrix, columns = self.system(state)

@@ -23,7 +23,7 @@ from armlab.effects.links import (
     PAYLOAD_FACTS,
     Payload,
     SolidBody,
-    felt_values,
+    felt_by_ten,
     pseudo_inertia_parts,
 )
 from problem.pseudo_inertia import parameters_of, pseudo_inertias
@@ -85,19 +85,18 @@ def fit_body(model: FittedModel, without: State, group: int, link: int) -> Place
     """
     solver = model.solver
     columns, gram = solver.groups[group].columns, model.moments.gram
-    ten_to_felt = np.column_stack([felt_values(model.design.simulation.arm, link, unit) for unit in np.eye(10)])
-    scaled = model.moments.lengths[columns][:, None] * ten_to_felt
-    (matrix, other_columns), products = solver.system(without), solver.products(without)
-    solved = np.linalg.solve(matrix, products)
-    rest = gram[np.ix_(columns, columns)] - products[:, columns].T @ solved[:, columns]
-    towards = gram[columns, -1] - products[:, columns].T @ solved[:, -1]
+    scaled = model.moments.lengths[columns][:, None] * felt_by_ten(model.design.simulation.arm, link)
+    fit, own_and_torque = solver.free_fit(without), np.append(columns, -1)
+    products = solver.products(without, own_and_torque)
+    solved = fit.inverse @ products
+    rest = gram[np.ix_(columns, columns)] - products[:, :-1].T @ solved[:, :-1]
+    towards = gram[columns, -1] - products[:, :-1].T @ solved[:, -1]
     ten, gain = _likeliest_body(scaled.T @ rest @ scaled, scaled.T @ towards)
     own = scaled @ ten
     coefficients = np.zeros(model.moments.size)
-    others = solved[:, -1] - solved[:, columns] @ own
-    factor = solver.links(without.widths).factor
-    coefficients[: solver.base] = factor @ others[: factor.shape[1]]
-    coefficients[other_columns] = others[factor.shape[1] :]
+    others, rank = solved[:, -1] - solved[:, :-1] @ own, fit.links.shape[1]
+    coefficients[: solver.base] = fit.links @ others[:rank]
+    coefficients[fit.columns] = others[rank:]
     coefficients[columns] = own
     return PlacedBody(group, link, ten, coefficients, gain, model.moments.heldout_error(coefficients))
 

@@ -13,7 +13,7 @@ from armlab.diagnosis.torque.names.intervals import ShapedFit, extend_with_shape
 from armlab.diagnosis.torque.predict.prediction import Prediction
 from armlab.diagnosis.torque.search.fitted_model import FittedModel
 from armlab.effects.contract import Candidate, Effect
-from armlab.effects.links import INERTIAL_ERROR_FACTS, LinkLaw, felt_values, link_law
+from armlab.effects.links import INERTIAL_ERROR_FACTS, LinkLaw, felt_by_ten, link_law
 from armlab.effects.parameters import parameter_values
 
 
@@ -131,7 +131,7 @@ def _link_claim(
     """The claim about one link. mean (10,), spread (10, 10): what it has more than its simulation."""
     design, candidate = model.design, law.candidate
     link = candidate.joints[0]
-    turn = np.column_stack([felt_values(design.simulation.arm, link, unit) for unit in np.eye(10)])
+    turn = felt_by_ten(design.simulation.arm, link)
     coefficients, covariance = turn @ mean, turn @ spread @ turn.T
     change, torque = np.zeros(10 * len(design.simulation.arm)), np.zeros(model.moments.size)
     change[10 * link - 10 : 10 * link] = mean
