@@ -124,6 +124,7 @@ _NOUNS: Mapping[str, tuple[str, Sections]] = {
                 "calibrate-names": "armlab.cli.proof_learning:calibrate_names",
                 "calibrate-unknown": "armlab.cli.proof_learning:calibrate_unknown",
                 "calibrate-reading": "armlab.cli.proof_learning:calibrate_reading",
+                "survival": "armlab.cli.proof_learning:survival",
                 "ablate": "armlab.cli.proof_learning:ablate",
                 "next-loop": "armlab.cli.proof_learning:next_loop",
                 "coverage": "armlab.cli.proof_real:coverage",

@@ -41,6 +41,11 @@ _FILE = click.Path(path_type=Path)
 )
 @click.option("--verbose", is_flag=True, help="Print every finding with its evidence, what is left, and all errors.")
 @click.option("--why", multiple=True, metavar="EFFECT@JOINT", help="Say why this is a finding, or none; repeatable.")
+@click.option(
+    "--survival",
+    type=click.IntRange(min=2, max=1000),
+    help="Diagnose twice so many recordings simulated from the model found: does each name return, like 20?",
+)
 @prints_result
 def diagnose(
     recordings: tuple[Path, ...],
@@ -57,6 +62,7 @@ def diagnose(
     tables: tuple[str, ...],
     verbose: bool,
     why: tuple[str, ...],
+    survival: int | None,
 ) -> ResultLines:
     """Find the physics that the simulation of RECORDING lacks.
 
@@ -81,6 +87,8 @@ def diagnose(
     motion_only = is_motion_only(recordings[0])
     if why and (old is not None or motion_only or only_setup):
         raise InputError("--why: only a diagnosis of torque has a log of names, leave it out")
+    if survival and (old is not None or motion_only or only_setup):
+        raise InputError("--survival: only a diagnosis of torque can be simulated anew, leave it out")
     if motion_only and (baseline or without or as_read or only_setup):
         raise InputError("a recording of motion only takes --out, --set, --mcap, --table, --compare: leave out others")
     if any(change.startswith("motion.") != motion_only for change in changes):
@@ -103,7 +111,19 @@ def diagnose(
 
     reading = as_read, only_setup
     return diagnose_recording(
-        recordings[0], out, baseline, seed, without, changes, *reading, tell_progress, mcap, tables, verbose, why
+        recordings[0],
+        out,
+        baseline,
+        seed,
+        without,
+        changes,
+        *reading,
+        tell_progress,
+        mcap,
+        tables,
+        verbose,
+        why,
+        survival or 0,
     )
 
 

@@ -133,6 +133,35 @@ def calibrate_reading(work: Path, out: Path) -> Iterator[str]:
 
 
 @click.command()
+@click.argument("folder", type=_PATH)
+@click.option("--cases", type=click.IntRange(min=1), default=100, show_default=True, help="The first so many.")
+@click.option("--repetitions", type=click.IntRange(min=2), default=20, show_default=True, help="As of `diagnose`.")
+@click.option("--work", type=OutputPath(), default=Path(".armlab/survival"), show_default=True)
+@click.option("--results", type=OutputPath(), default=Path("results/proof"), show_default=True)
+@prints_lines
+def survival(folder: Path, cases: int, repetitions: int, work: Path, results: Path) -> Iterator[str]:
+    """Count how often names that survive are right.
+
+    FOLDER is a concealed development set (`armlab conceal`). Each case is diagnosed with --survival; an interrupted
+    command continues.
+    """
+    from armlab.proof.blind.score.survival import (
+        diagnose_with_survival,
+        read_survivals,
+        survival_rows,
+        write_survival,
+    )
+
+    done = 0
+    for done, name in enumerate(diagnose_with_survival(folder, cases, repetitions, work), 1):
+        yield f"  {name}: {done} of at most {cases}"
+    found = read_survivals(folder, cases, work)
+    yield from (f"{about}: {count} names, right {right}" for about, count, right in survival_rows(found))
+    for path in write_survival(found, f"{done} development cases, {repetitions} times with all findings", results):
+        yield f"wrote {path}"
+
+
+@click.command()
 @click.option("--seed", type=int, default=1950, show_default=True, help="A development seed, 1000-1999.")
 @click.option("--cases", type=click.IntRange(min=1), default=50, show_default=True, help="Mixed cases, both tiers.")
 @click.option("--nulls", type=click.IntRange(min=1), default=50, show_default=True, help="Cases with nothing hidden.")

@@ -102,6 +102,15 @@ class ClassMember(Entry):
     probability: Share
 
 
+class SurvivalEntry(Entry):
+    """How often a name is found in torque that is simulated anew: of so many with the finding, and without it."""
+
+    returned: int
+    simulated: int
+    appeared: int
+    left_out: int
+
+
 class FindingEntry(Entry):
     """One named difference between simulation and robot.
 
@@ -111,7 +120,7 @@ class FindingEntry(Entry):
     and where the motion is. heldout_rms: N m (N), of the model found without the finding, the rest fitted anew, and
     with it. p_value: corrected for all comparisons. form: the law or the quantity. share_of_gap: of the held-out error
     above the noise. minor: in the model and in this list, and of no practical size. probability: of the name.
-    class: effects and joints with their probabilities.
+    class: effects and joints with their probabilities. survival: where it was asked for (`diagnose --survival`).
     """
 
     effect: EffectName
@@ -130,6 +139,7 @@ class FindingEntry(Entry):
     class_: tuple[ClassMember, ...] | None = Field(default=None, alias="class")
     rivals: tuple[RivalEntry, ...]
     next_experiment: str | None = None
+    survival: SurvivalEntry | None = None
 
 
 class DoubtEntry(Entry):

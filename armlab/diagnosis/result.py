@@ -121,6 +121,19 @@ class JointFriction:
     interval: tuple[tuple[float, float], tuple[float, float]]
 
 
+@dataclass(frozen=True)
+class Survival:
+    """How often a name is found again in torque that is simulated from the model found, with what it leaves drawn anew.
+
+    returned of simulated: with the finding in the simulation. appeared of left_out: without it.
+    """
+
+    returned: int
+    simulated: int
+    appeared: int
+    left_out: int
+
+
 @dataclass(frozen=True, eq=False)
 class Claim:
     """One finding. joint: from 1, the link for parameters of a link, None for the whole robot.
@@ -133,6 +146,7 @@ class Claim:
     left_out: the part of its torque that the model found does not predict. simulated: its scalar parameters as the
     simulation has them, where it has a law of this kind there, to which the finding adds. removal: of it alone from the
     model found. minor: of no practical size, or not among the findings that are told (`armlab.report.account`).
+    survival: None unless it was asked for.
     """
 
     effect: str
@@ -158,6 +172,7 @@ class Claim:
     simulated: Mapping[str, float] = field(default_factory=dict)
     removal: Removal | None = None
     minor: bool = False
+    survival: Survival | None = None
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -25,6 +26,7 @@ from armlab.diagnosis.formats import (
     RecordedEntry,
     RivalEntry,
     StoryEntry,
+    SurvivalEntry,
     UnexplainedEntry,
     VerdictFile,
     WhereEntry,
@@ -166,7 +168,10 @@ def _finding_entry(claim: Claim, share: float) -> FindingEntry:
     members = tuple(
         ClassMember(effect=each.effect, joint=each.joint, probability=each.probability) for each in claim.members
     )
-    return entry.model_copy(update={"class_": members}) if members else entry
+    more: dict[str, Any] = {"class_": members} if members else {}
+    if claim.survival is not None:
+        more["survival"] = SurvivalEntry(**asdict(claim.survival))
+    return entry.model_copy(update=more)
 
 
 def _finding_parameter(each: ParameterValue, claim: Claim) -> ParameterEntry:

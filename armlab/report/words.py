@@ -8,7 +8,7 @@ from string import Formatter
 import numpy as np
 
 from armlab.common.report.wording import format_number, format_unit, join_words
-from armlab.diagnosis.result import Claim, Member, Rival
+from armlab.diagnosis.result import Claim, Member, Rival, Survival
 from armlab.diagnosis.settings import Baseline
 from armlab.diagnosis.torque.names.findings import Statement
 from armlab.diagnosis.torque.rows.simulation import Simulation
@@ -65,6 +65,14 @@ def statement_in_words(statement: Statement) -> str:
     if statement.kind == "cause":
         return f"its law is not certain, the cause has probability {chance}"
     return f"named with probability {chance}"
+
+
+def survival_in_words(survival: Survival) -> str:
+    """How often a name is found again: `returns in 19 of 20 simulated recordings, appears in 1 of 10 without it`."""
+    return (
+        f"returns in {survival.returned} of {survival.simulated} simulated recordings, "
+        f"appears in {survival.appeared} of {survival.left_out} without it"
+    )
 
 
 def member_in_words(arm: Arm, member: Member) -> str:

@@ -1,13 +1,13 @@
 """From what is believed in the end to a diagnosis: claims, the model that is delivered, and what each part explains."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from armlab.common.errors import DataError
 from armlab.diagnosis.formats import Status
-from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Unexplained
+from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Unexplained, Weighed
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.solver import State
@@ -56,10 +56,23 @@ from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.recording import Recording
 
 
-def conclude(recording: Recording, belief: Belief) -> Diagnosis:
-    """The diagnosis of a recording from what is believed in the end."""
-    prediction, remains = belief.prediction, remaining(belief)
-    assert prediction is not None
+@dataclass(frozen=True, eq=False)
+class NamedClaims:
+    """Claims with a name, a class or none. model: with the reasons in its log. weighed: all names that were weighed.
+
+    unknowns: structure that is a finding `unknown`; remains: all structure that is left.
+    """
+
+    model: FittedModel
+    claims: tuple[Claim, ...]
+    weighed: tuple[Weighed, ...]
+    unknowns: Sequence[Structure]
+    remains: Sequence[Structure]
+
+
+def name_claims(belief: Belief) -> NamedClaims:
+    """The claims of what is believed in the end, each with its name."""
+    remains = remaining(belief)
     explained = {**belief.effects, **belief.present}
     unknowns = [each for each in remains if not is_form_error(each, explained, belief.tuning.unknown)]
     model, claims = _claims_of(belief, remains, unknowns)
@@ -67,10 +80,17 @@ def conclude(recording: Recording, belief: Belief) -> Diagnosis:
     settings, plain = model.design.settings, model.design.simulation.joints_without_friction
     named = named_claims(claims, settings, plain)
     model = replace(model, steps=(*model.steps, *lost_names(claims, named, settings)))
-    claims = named
-    claims = (*claims, *links_in_doubt(model, prediction.model, claims))
-    claims = stated_findings(weigh_claims(prediction.model, claims), model.columns.joints)
-    return replace(_assemble(recording, model, prediction, claims, unknowns, remains), weighed=weighed)
+    return NamedClaims(model, named, weighed, unknowns, remains)
+
+
+def conclude(recording: Recording, belief: Belief) -> Diagnosis:
+    """The diagnosis of a recording from what is believed in the end."""
+    prediction, named = belief.prediction, name_claims(belief)
+    assert prediction is not None
+    claims = (*named.claims, *links_in_doubt(named.model, prediction.model, named.claims))
+    claims = stated_findings(weigh_claims(prediction.model, claims), named.model.columns.joints)
+    found = _assemble(recording, named.model, prediction, claims, named.unknowns, named.remains)
+    return replace(found, weighed=named.weighed)
 
 
 def _claims_of(

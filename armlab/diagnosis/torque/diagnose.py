@@ -22,6 +22,7 @@ from armlab.diagnosis.torque.search.fitted_model import (
     Progress,
 )
 from armlab.diagnosis.torque.stages import BY_PROBABILITY, BY_TESTS, find_names, run_stages
+from armlab.diagnosis.torque.survival import with_survival
 from armlab.recordings.check import signs_of_wrong_reading
 from armlab.recordings.identifiable import reason_impossible, reason_not_identifiable
 from armlab.recordings.reading.answer import Answer, read_rightly
@@ -39,12 +40,14 @@ def diagnose(
     progress: Progress = lambda message: None,
     as_read: bool = False,
     only_setup: bool = False,
+    repetitions: int = 0,
 ) -> Diagnosis:
     """Where the simulation and the recording differ, what physics is missing, and how much better it then predicts.
 
     baseline: what is compared; the simulation where there is one if left out. seed: of the surrogates' random waves.
     progress: is told what is being done. as_read: the recording and the robot file are not doubted. only_setup: nothing
-    but the reading is asked. Raises InputError where the wanted baseline is not there.
+    but the reading is asked. repetitions: how often it is asked whether names survive (`with_survival`). Raises
+    InputError where the wanted baseline is not there.
     """
     started, settings = time.perf_counter(), settings or Settings()
     signs = signs_of_wrong_reading(recording)
@@ -58,7 +61,10 @@ def diagnose(
     design = prepare(recording, baseline, settings, progress)
     if isinstance(design, Diagnosis):
         return with_setup(replace(design, signs=signs), setup, read_after)
-    found = _conclude_names(recording, find_names(design, seed, progress), progress)
+    belief = run_stages(BY_PROBABILITY, find_names(design, seed, progress), progress)
+    found = conclude(recording, belief)
+    if repetitions:
+        found = with_survival(found, belief, design, repetitions, seed, progress)
     found = _only_if_explained(found, setup, settings.tuning.reading)
     found = replace(found, signs=signs, seconds=time.perf_counter() - started)
     return with_setup(found, setup, read_after)
@@ -149,8 +155,5 @@ def prepare(
 
 def conclude_search(recording: Recording, searched: FittedModel, progress: Progress) -> Diagnosis:
     """The diagnosis of a recording from what a search found."""
-    return _conclude_names(recording, run_stages(BY_TESTS, Belief(searched), progress), progress)
-
-
-def _conclude_names(recording: Recording, named: Belief, progress: Progress) -> Diagnosis:
+    named = run_stages(BY_TESTS, Belief(searched), progress)
     return conclude(recording, run_stages(BY_PROBABILITY, named, progress))

@@ -36,6 +36,7 @@ from armlab.report.words import (
     parameter_rows,
     rival_in_words,
     statement_in_words,
+    survival_in_words,
     variable_in_words,
     variables_in_words,
 )
@@ -225,6 +226,8 @@ def _finding_detail(diagnosis: Diagnosis, finding: StatedFinding, picture: Marku
         "correction for everything that was compared."
     )
     chance = statement_in_words(finding.statement)
+    if claim.survival is not None:
+        chance += f"; {survival_in_words(claim.survival)}"
     return FindingDetail(
         title=_finding_at_start(arm, claim),
         share=format_share(finding.share),

@@ -30,6 +30,7 @@ from armlab.report.words import (
     rival_in_words,
     shorten_name,
     statement_in_words,
+    survival_in_words,
     variables_in_words,
 )
 from problem.arm import Arm
@@ -100,6 +101,10 @@ def verdict_lines(diagnosis: Diagnosis, verbose: bool = False) -> Iterator[str]:
         yield from _setup_lines(number, mistake, arm)
     if diagnosis.claims:
         yield from _joint_lines(diagnosis, account)
+    for each in account.findings:
+        if each.claim.survival is not None and not verbose:
+            text = f"{finding_in_words(arm, each.claim)}: {survival_in_words(each.claim.survival)}"
+            yield from (f"  {line}" for line in wrap(text, LINE_WIDTH - 2))
     if account.minor:
         yield f"  {count_of(len(account.minor), 'small difference')} more, in verdict.json and folded on the page"
     if diagnosis.is_plain:
@@ -221,6 +226,8 @@ def _finding_lines(number: int, finding: StatedFinding, simulation: Simulation) 
     growth, probability = format_growth(*finding_errors(claim)), format_probability(claim.evidence.corrected)
     gain = f"{format_share(finding.share)} of the error; without it the held-out error of {where} is {growth}"
     whole = f"{gain}; p {probability}; {statement_in_words(finding.statement)}"
+    if claim.survival is not None:
+        whole += f"; {survival_in_words(claim.survival)}"
     yield from (f"     {line}" for line in wrap(whole, LINE_WIDTH - 5))
     same = ", ".join(rival_in_words(arm, each) for each in claim.rivals if each.identical)
     if same:

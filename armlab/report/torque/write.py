@@ -120,6 +120,7 @@ def diagnose_recording(
     tables: Sequence[str] = (),
     verbose: bool = False,
     why: Sequence[str] = (),
+    repetitions: int = 0,
 ) -> ResultLines:
     """Diagnoses a recording, writes verdict.json, report.html, model.yaml and figures, and yields lines to print.
 
@@ -130,6 +131,7 @@ def diagnose_recording(
     only_setup: nothing but the reading is asked. progress: called with the name of each step. with_signals: whether
     `signals.mcap` is written. tables: forms in which the table of joints is written, too (`TABLE_FORMS`). verbose:
     whether the lines tell of every finding. why: effects as EFFECT@JOINT of which is told why they are named or not.
+    repetitions: how often it is asked whether names survive.
     Raises InputError, in one line, for a recording that cannot be used, an
     unknown guard or an unknown tuning number.
     """
@@ -143,7 +145,7 @@ def diagnose_recording(
     places = [parse_place(each, recording.arm) for each in why]
     check_output_folder(out, recording)
     try:
-        diagnosis = diagnose(recording, chosen, seed, settings, progress, as_read, only_setup)
+        diagnosis = diagnose(recording, chosen, seed, settings, progress, as_read, only_setup, repetitions)
     except DataError as error:
         raise InputError(f"{folder}: {error}") from None
     progress("writing the report")
@@ -151,6 +153,7 @@ def diagnose_recording(
     options += [word for guard in without for word in ("--without", guard)]
     options += [word for change in changes for word in ("--set", change)]
     options += ["--as-read"] * as_read + ["--only-setup"] * only_setup + ["--mcap"] * with_signals
+    options += ["--survival", str(repetitions)] if repetitions else []
     options += [word for form in dict.fromkeys(tables) for word in ("--table", form)]
     command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out), *options])
     texts = folder_texts(diagnosis, out, settings, command)
