@@ -22,7 +22,6 @@ from armlab.diagnosis.torque.search.fitted_model import (
     Progress,
 )
 from armlab.diagnosis.torque.stages import BY_PROBABILITY, BY_TESTS, find_names, run_stages
-from armlab.diagnosis.torque.survival import with_survival
 from armlab.recordings.check import signs_of_wrong_reading
 from armlab.recordings.identifiable import reason_impossible, reason_not_identifiable
 from armlab.recordings.reading.answer import Answer, read_rightly
@@ -64,6 +63,8 @@ def diagnose(
     belief = run_stages(BY_PROBABILITY, find_names(design, seed, progress), progress)
     found = conclude(recording, belief)
     if repetitions:
+        from armlab.diagnosis.torque.survival import with_survival  # and joblib, which takes long to import
+
         found = with_survival(found, belief, design, repetitions, seed, progress)
     found = _only_if_explained(found, setup, settings.tuning.reading)
     found = replace(found, signs=signs, seconds=time.perf_counter() - started)
