@@ -280,27 +280,27 @@ class Solver:
         """
         if self._rests is None or self._rests[0] != state:
             self._rests = state, self._what_is_left(state)
-        rests, out, more = self._rests[1], np.empty(len(self.groups)), None
+        rests, out, freed = self._rests[1], np.empty(len(self.groups)), None
         if but is not None:
-            more, state = self._of_group(state, but), state.minus(but)
+            freed, state = self._of_group(state, but), state.minus(but)
         for width, (numbers, offered) in self._by_width.items():
             rest, towards = rests[width]
-            if more is not None:
-                part = more[:, offered]  # (columns of `but`, groups, width)
-                rest = rest + np.einsum("rgi,rgj->gij", part, part)
-                towards = towards + np.einsum("rgi,r->gi", part, more[:, -1])
+            if freed is not None:
+                one, other = freed[0][:, offered], freed[1][:, offered]  # (columns of `but`, groups, width)
+                rest = rest + np.einsum("rgi,rgj->gij", one, other)
+                towards = towards + np.einsum("rgi,r->gi", one, freed[1][:, -1])
             solved = np.linalg.solve(rest + ridge * np.eye(width), towards[:, :, None])[:, :, 0]
             out[numbers] = 0.5 * np.sum(towards * solved, axis=1)
         return out - self.prices - self.tuning.crowd_penalty * self.crowd(state.groups) * self.unusual
 
-    def _of_group(self, state: State, group: int) -> Array:
-        """Rows whose products are what a state's columns explain with a group and not without it."""
+    def _of_group(self, state: State, group: int) -> tuple[Array, Array]:
+        """Two matrices (columns of a group, size + 1): their product is what a state explains with it alone."""
         fit, links = self.fit(state), self.links(state.widths)
         place, rank = self._place(fit, group), len(links.own)
         weights = (
             fit.inverse[place, :rank] @ links.products + fit.inverse[place, rank:] @ self.moments.gram[fit.columns]
         )
-        return np.asarray(solve_triangular(np.linalg.cholesky(fit.inverse[place, place]), weights, lower=True))
+        return weights, np.asarray(np.linalg.solve(fit.inverse[place, place], weights), dtype=np.float64)
 
     def _place(self, fit: Fit, group: int) -> slice:
         """Where a group's coefficients stand in a fit's covariance."""
