@@ -32,6 +32,7 @@ SHOWN = (
     "right_name_or_class",
     "right_joint",
     "unknown_outside",
+    "left_outside",
     "right_when_doubtful",
     "right_when_likely",
     "right_when_sure",

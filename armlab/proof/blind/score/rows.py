@@ -36,6 +36,7 @@ EFFECT_COLUMNS = [
     "class_size",
     "right_joint",
     "answered",
+    "told_as_left",
 ]
 CLAIM_COLUMNS = [*KEY_COLUMNS, "effect", "joint", "category", "class_size", "class_right", "probability"]
 COMPARISON_COLUMNS = ["parameter", "truth", "value", "relative_error", "covered"]
@@ -119,6 +120,7 @@ def _effect_rows(case: JudgedCase) -> Iterator[dict[str, Any]]:
             "class_size": min(sizes) if sizes else None,
             "right_joint": right_joint if named and not effect.outside else None,
             "answered": _given_answer(case, effect),
+            "told_as_left": says_unknown or any(each["joint"] == effect.joint for each in case.verdict["unexplained"]),
         }
 
 
