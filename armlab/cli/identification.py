@@ -132,7 +132,11 @@ def payload(
 
 @click.command()
 @click.argument("loaded", type=click.Path(path_type=Path))
-@click.option("--without", type=click.Path(path_type=Path), required=True, help="Recording without the load.")
+@click.option(
+    "--without",
+    type=click.Path(path_type=Path),
+    help="Recording without the load [default: the robot file's links stand for it].",
+)
 @click.option("--mass", type=FiniteNumber(min=0, max=1e5, min_open=True), required=True, help="Of the load, kg.")
 @click.option(
     "--centre",
@@ -145,7 +149,7 @@ def payload(
 @prints_result
 def gains(
     loaded: Path,
-    without: Path,
+    without: Path | None,
     mass: float,
     centre: tuple[float, float, float],
     link: int | None,
@@ -156,6 +160,10 @@ def gains(
 
     Uses the known load that the arm carries in LOADED, a recording folder.
     """
+    from armlab.diagnosis.torque.carried_load import nominal_gains_lines
     from armlab.identification.payload import PayloadSetting, Place, gains_lines
 
-    return gains_lines(loaded, without, mass, PayloadSetting(Place(link, centre), counterbalance, cutoff_hz))
+    setting = PayloadSetting(Place(link, centre), counterbalance, cutoff_hz)
+    if without is None:
+        return nominal_gains_lines(loaded, mass, setting, tell_progress)
+    return gains_lines(loaded, without, mass, setting)

@@ -317,12 +317,18 @@ def gains_lines(loaded: Path, without: Path, mass: float, setting: PayloadSettin
         gains = torque_gains(task.structure, task.without, task.loaded, load, setting.place.link)
     except DataError as error:
         raise InputError(f"{loaded}: {error}") from None
-    yield from _gains_table(gains)
+    yield from gains_table(gains)
+    return gains_document(gains)
+
+
+def gains_document(gains: TorqueGains) -> Document:
+    """The gain of each joint as a document."""
     pairs = enumerate(zip(gains.gains, gains.half_widths, strict=True), 1)
     return {"gains": [{"joint": joint, **_interval(gain, half, "1")} for joint, (gain, half) in pairs]}
 
 
-def _gains_table(gains: TorqueGains) -> Iterator[str]:
+def gains_table(gains: TorqueGains) -> Iterator[str]:
+    """The gain of each joint in a line."""
     for joint, (gain, half) in enumerate(zip(gains.gains, gains.half_widths, strict=True), 1):
-        unknown = "the load does not load it" if np.isnan(gain) else ""
+        unknown = "the load does not load it enough" if np.isnan(gain) else ""
         yield f"joint {joint}: {unknown}" if unknown else _interval_line(f"joint {joint}: gain", gain, half, "")

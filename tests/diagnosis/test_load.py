@@ -5,6 +5,7 @@ import pickle
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from example_log import record_example
 from public_copies import needs_copies
@@ -12,7 +13,7 @@ from refusals import refusal
 
 from armlab.common.documents import Document
 from armlab.diagnosis.torque.belief import Belief
-from armlab.diagnosis.torque.carried_load import nominal_payload_lines
+from armlab.diagnosis.torque.carried_load import find_gains, nominal_gains_lines, nominal_payload_lines
 from armlab.diagnosis.torque.columns.design import DesignMatrix
 from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.diagnosis.torque.search.fitted_model import Progress
@@ -20,6 +21,7 @@ from armlab.diagnosis.torque.stages import find_names
 from armlab.identification.payload import PayloadSetting, Place
 from armlab.recordings.load import load_recording
 from armlab.recordings.public import fetch_recording
+from problem.pseudo_inertia import link_from_centre_of_mass
 
 TRUTH = {"m": 1.5, "mcx": 0.075, "mcz": 0.12, "Ixx": 0.0136, "Iyy": 0.01735, "Izz": 0.00775, "Ixz": -0.006}
 
@@ -79,6 +81,23 @@ def test_a_known_place_leaves_only_the_mass(example_recording: Path) -> None:
     assert list(found["parameters"]) == ["m"]
     assert found["parameters"]["m"]["value"] == pytest.approx(1.5, rel=0.02)  # the load is not a point, as this says
     assert lines[0].startswith("m = 1.5")
+
+
+@pytest.mark.parametrize("too_large", [1.0, 1.1])
+def test_a_known_load_shows_how_much_too_large_torque_is_read(example_recording: Path, too_large: float) -> None:
+    where = PayloadSetting(Place(None, (0.05, 0.0, 0.08)))
+    lines = list(nominal_gains_lines(example_recording, TRUTH["m"] / too_large, where, lambda message: None))
+    assert [each.split(":")[0] for each in lines] == ["joint 1", "joint 2", "joint 3"]
+    load = link_from_centre_of_mass(TRUTH["m"] / too_large, np.array(where.place.centre), np.zeros((3, 3)))
+    found = find_gains(load_recording(example_recording), load.parameters, where, lambda message: None)
+    assert np.all(np.abs(found.gains - too_large) < 0.03)  # the load is not a point, as this says
+    assert np.all(found.half_widths < 0.1)
+
+
+def test_a_load_on_the_first_axis_shows_no_gain(example_recording: Path) -> None:
+    place = PayloadSetting(Place(1, (0.0, 0.0, 0.1)))
+    message = refusal(lambda: list(nominal_gains_lines(example_recording, 1.5, place, lambda message: None)))
+    assert "do not determine the gains: no joint feels the load enough" in message
 
 
 @pytest.mark.parametrize(

@@ -78,7 +78,7 @@ def test_a_known_load_shows_the_gain_of_the_joints_that_it_loads(tmp_path: Path)
     without = recording(tmp_path / "without", np.zeros(10), 2, 2, factors)
     text = invoke(gains, loaded, "--without", without, "--mass", 5, "--link", 2, "--centre", *CENTRE)
     rows = text.splitlines()
-    assert rows[2] == "joint 3: the load does not load it"
+    assert rows[2] == "joint 3: the load does not load it enough"
     low, high = interval(rows[1])
     assert low < 1.09 < high
     assert high - low < 0.05

@@ -1,4 +1,4 @@
-"""The load of an arm whose robot file describes it without: beside all that the diagnosis names.
+"""The load of an arm whose robot file describes it without, or the gains that a known one shows.
 
 Nobody has recorded the arm without the load, so what else the robot file lacks has to be found in the same runs. The
 model is that of `armlab diagnose`; in the place of bodies that it adds there is one at the link that carries the load.
@@ -6,6 +6,7 @@ model is that of `armlab diagnose`; in the place of bodies that it adds there is
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -39,6 +40,9 @@ from armlab.identification.payload import (
     CENTRE_NAMES,
     LoadNumber,
     PayloadSetting,
+    TorqueGains,
+    gains_document,
+    gains_table,
     load_document,
     number_line,
 )
@@ -46,9 +50,12 @@ from armlab.recordings.identifiable import require_identifiable
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
 from problem.arm import PARAMETER_NAMES, PARAMETER_UNITS, Arm
+from problem.pseudo_inertia import link_from_centre_of_mass
 
 MASS_NAME = PARAMETER_NAMES[0]
 UNDETERMINED = "these motions do not determine the mass of the load"
+SMALLEST_SHARE = 1e-6  # of the torque of a load at the joint that feels it most: less is rounding
+MAX_GAIN_HALF_WIDTH = 1.0  # a reading that may be off by all of itself says nothing
 METRES = {"kg": 0, "kg.m": 1, "m": 1, "kg.m2": 2}  # how often a unit has the metre
 
 
@@ -79,6 +86,39 @@ class MassAtPoint(LinkTerm):
 
 
 @dataclass(frozen=True)
+class LoadAtJoint(LinkTerm):
+    """The torque of a known load at one joint: the coefficient is how many times the reading there is too large.
+
+    load: its ten parameters in the link's frame. felt_at: the joint, from 1.
+    """
+
+    facts = PAYLOAD_FACTS
+    form = "known load"
+    names = ("gain",)
+    load: tuple[float, ...] = (0.0,) * 10
+    felt_at: int = 1
+
+    @classmethod
+    def is_visible(cls, arm: Arm, link: int) -> bool:
+        """Whether the arm can weigh the link."""
+        return Payload.is_visible(arm, link)
+
+    @classmethod
+    def each(cls, link: int, load: Array) -> list[Self]:
+        """At each joint up to a link, from 1. load: (10,)."""
+        ten = tuple(load.tolist())
+        return [cls(link, (link,), (joint - 1,), load=ten, felt_at=joint) for joint in range(1, link + 1)]
+
+    def columns(self, scene: Scene) -> Array:
+        """Torque of the load at the joint."""
+        joint = self.felt_at - 1
+        return torque_of_parameters(scene, self.link, np.array([self.load]))[:, joint : joint + 1]
+
+    def equation(self, coefficients: Array) -> str:
+        return f"the load counts {format_number(coefficients[0])} times at joint {self.felt_at}"
+
+
+@dataclass(frozen=True)
 class FoundLoad:
     """Numbers of a load that the motions determine, the names of those that they do not, and what stands beside it."""
 
@@ -98,9 +138,7 @@ def nominal_payload_lines(loaded: Path, setting: PayloadSetting, progress: Progr
     if recording.arm.links is None:
         raise InputError(f"--without is needed: the robot {recording.arm.name} has no nominal `links` to stand for it")
     require_identifiable(recording)
-    settings = Settings()
-    if setting.cutoff_hz is not None:
-        settings = vary(settings, "data.cutoff_hz", setting.cutoff_hz)
+    settings = _settings_of(setting)
     setup = find_setup(recording, None, settings, progress)
     if setup is not None and setup.findings:
         yield setup.sentence
@@ -114,15 +152,70 @@ def nominal_payload_lines(loaded: Path, setting: PayloadSetting, progress: Progr
     return {**document, "not_determined": list(found.undetermined), "beside": list(found.beside)}
 
 
-def find_load(recording: Recording, setting: PayloadSetting, settings: Settings, progress: Progress) -> FoundLoad:
-    """The load of a recording that is read rightly; InputError where its mass is not determined."""
-    link, centre = setting.place.link or len(recording.arm), setting.place.centre
+def _settings_of(setting: PayloadSetting) -> Settings:
+    """Those of a diagnosis, with the cut-off that a person gives."""
+    return Settings() if setting.cutoff_hz is None else vary(Settings(), "data.cutoff_hz", setting.cutoff_hz)
+
+
+def nominal_gains_lines(loaded: Path, mass: float, setting: PayloadSetting, progress: Progress) -> ResultLines:
+    """The gain of each joint's torque reading from a known load beside the robot file's links.
+
+    The recording is taken as it is read: a wrong gain is a mistake of reading. mass: of the load, kg, at the centre of
+    the setting. Raises InputError, in one line, where no joint feels the load.
+    """
+    recording = load_recording(loaded)
+    setting.check(recording.arm)
+    require_identifiable(recording)
+    if recording.arm.links is None:
+        raise InputError(f"--without is needed: the robot {recording.arm.name} has no nominal `links` to stand for it")
+    load = link_from_centre_of_mass(mass, np.array(setting.place.centre or (0.0, 0.0, 0.0)), np.zeros((3, 3)))
+    gains = find_gains(recording, load.parameters, setting, progress)
+    yield from gains_table(gains)
+    return gains_document(gains)
+
+
+def find_gains(recording: Recording, load: Array, setting: PayloadSetting, progress: Progress) -> TorqueGains:
+    """How much each joint's torque reading is too large, by a load of known parameters (10,) in its link's frame.
+
+    The robot file's links stand for the arm without it, as its readings have them. Raises InputError where no joint
+    feels the load.
+    """
+    link, joints = setting.place.link or len(recording.arm), len(recording.arm)
+    bare = _bare_model(recording, link, setting, _settings_of(setting), progress)
+    gains, half = np.full((2, joints), np.nan)
+    candidates, groups = LoadAtJoint.each(link, load), {}
+    sizes = [max(float(np.abs(each.columns(scene)).max()) for scene in bare.design.scenes) for each in candidates]
+    for candidate, size in zip(candidates, sizes, strict=True):
+        if size > SMALLEST_SHARE * max(sizes):
+            bare, groups[candidate.felt_at - 1] = _with_candidate(bare, candidate)
+    wide = extend_with_shapes(bare)
+    for joint, group in groups.items():
+        spread = wide.factor * float(np.sqrt(wide.covariance(group)[0, 0]))
+        if spread < MAX_GAIN_HALF_WIDTH:
+            gains[joint], half[joint] = float(bare.solver.values(bare.fit, group)[0]), spread
+    if np.isnan(gains).all():
+        raise InputError(
+            f"{recording.folder}: these motions do not determine the gains: no joint feels the load enough"
+        )
+    return TorqueGains(gains, half)
+
+
+def _bare_model(
+    recording: Recording, link: int, setting: PayloadSetting, settings: Settings, progress: Progress
+) -> FittedModel:
+    """What the robot file lacks but a load at a link, from 1: as `armlab diagnose` finds it, without added bodies."""
     design = prepare(recording, None, settings, progress)
     if isinstance(design, Diagnosis):
         raise InputError(f"{recording.folder}: {design.reason}")
     if design.prior is None:
         raise InputError(f"--without is needed: links of the robot {recording.arm.name} have no mass")
-    bare = _with_counterbalance(_without_bodies(find_names(design, 0, progress).model, link), setting.counterbalanced)
+    return _with_counterbalance(_without_bodies(find_names(design, 0, progress).model, link), setting.counterbalanced)
+
+
+def find_load(recording: Recording, setting: PayloadSetting, settings: Settings, progress: Progress) -> FoundLoad:
+    """The load of a recording that is read rightly; InputError where its mass is not determined."""
+    link, centre = setting.place.link or len(recording.arm), setting.place.centre
+    bare = _bare_model(recording, link, setting, settings, progress)
     candidates = [bare.candidate(each) for each in bare.state.groups]
     beside = tuple(
         at_place(recording.arm, each.facts.words, each.effect, each.joint, each.joints) for each in candidates
