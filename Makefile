@@ -117,9 +117,8 @@ test: ## style, types and import contracts, the regression check and every test,
 	$(MAKE) --no-print-directory --jobs=3 regression lint suite
 
 # A worker takes the half of another one's tests when it has none: tests that share a fixture stay together.
-# One worker more than cores: many tests wait for processes that they start.
-suite: .venv/dev ## every test alone, a thread of linear algebra each
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/pytest -n $$(($$(getconf _NPROCESSORS_ONLN) + 1)) --dist worksteal
+suite: .venv/dev ## every test alone, a worker and a thread of linear algebra a core
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/pytest -n logical --dist worksteal
 
 lint: .venv/dev ## style, types and import contracts
 	$(BIN)/ruff check .
