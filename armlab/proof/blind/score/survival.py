@@ -90,11 +90,14 @@ def _share_right(names: pd.DataFrame) -> tuple[str, str]:
 
 def write_survival(found: pd.DataFrame, about: str, out: Path) -> tuple[Path, ...]:
     """Writes the rows and a page. about: which cases, and how often each was simulated."""
+    none_wrong = bool(found["right"].all())
+    note = "No name of them is wrong: that names which survive are right more often is not shown."
     page = markdown_page(
         "Names that survive",
         f"{len(found)} names of {about}, each with how often it returns in recordings that are simulated from the "
         "model found (`armlab diagnose --survival`). Right is a name that is hidden, in the background, or that no "
         "motion separates from one of these; a name of a class counts by itself.",
         markdown_table(("names", "number", "right"), survival_rows(found), (1, 2)),
+        *([note] if none_wrong else []),
     )
     return write_texts({TABLE_FILE: found.to_csv(index=False, lineterminator="\n"), PAGE_FILE: page}, out)
