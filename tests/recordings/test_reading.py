@@ -212,6 +212,18 @@ def test_the_margin_is_that_of_the_next_best_mistake_of_another_name(tmp_path: P
     assert found.margins == pytest.approx([judge.gain(second, found.best).near.total_sigmas])
 
 
+def test_each_mistake_of_a_reading_costs_what_a_named_one_has_to_explain(tmp_path: Path) -> None:
+    judge = ReadingJudge.of(recording_with(tmp_path), TUNING)
+    assert judge is not None
+    reading = read_as_is(judge.recording, None)
+    once = reading.with_mistake(Mistake("torque_sign", 1))
+    start, one, two = (judge.trial(each) for each in (reading, once, once.with_mistake(Mistake("torque_sign", 2))))
+    each_costs = TUNING.least_evidence + judge.improbability(once)
+    assert judge.cost(start) == start.loss
+    assert judge.cost(one) - start.loss == pytest.approx(each_costs)
+    assert judge.cost(two) - start.loss == pytest.approx(2 * each_costs)
+
+
 def test_names_leave_a_probability_that_none_is_right(tmp_path: Path) -> None:
     recording = recording_with(tmp_path / "rig", shift("q2", 90.0))
     (sure,), (doubtful,) = (

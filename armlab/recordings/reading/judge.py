@@ -218,6 +218,12 @@ class ReadingJudge:
         """Of the last mistake of a reading, nats a block: what it has to explain better than the commonest one."""
         return improbability(reading.mistakes[-1], reading.joints) / self.fitter.channels.blocks
 
+    def cost(self, trial: Trial) -> float:
+        """The loss of a reading, and what each of its mistakes has to explain to be named, nats."""
+        chance = sum(improbability(each, trial.reading.joints) for each in trial.reading.mistakes)
+        mistakes = len(trial.reading.mistakes)
+        return trial.loss + mistakes * self.tuning.least_evidence + chance / self.fitter.channels.blocks
+
     def overall_error(self, trial: Trial) -> float:
         """Held-out error near the simulation's links, geometric mean over the joints, of the torque's scatter."""
         near, _ = self.errors(trial.reading)

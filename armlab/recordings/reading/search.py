@@ -10,7 +10,6 @@ from armlab.recordings.reading import mistakes as table
 from armlab.recordings.reading.judge import ReadingJudge, Trial
 from armlab.recordings.reading.reading import SPRING, Mistake, Reading
 from armlab.recordings.reading.singles import search_singles
-from armlab.recordings.reading.tuning import ReadingTuning
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +43,7 @@ def find_mistakes(judge: ReadingJudge, start: Trial) -> Found:
             if is_taken or first.loss > start.loss - tuning.least_evidence:
                 continue
             other, more = _extend(judge, first, search_singles(judge, first))
-            if other is not first and _is_better(other, best, tuning) and judge.is_accepted(start, other):
+            if other is not first and judge.cost(other) < judge.cost(best) and judge.is_accepted(start, other):
                 best, beside = other, more
     if best is start:
         mistakes = [each for each in singles if each.reading.mistakes[-1].effect != SPRING]
@@ -65,12 +64,6 @@ def find_mistakes(judge: ReadingJudge, start: Trial) -> Found:
     rivals = tuple(_rivals(judge, without[place], best, place, each) for place, each in enumerate(lists))
     margins = tuple(_margin(judge, best, place, each) for place, each in enumerate(lists))
     return Found(start, best, without, rivals, margins, _undecided(judge, beside, best), looks=judge.looks[0])
-
-
-def _is_better(other: Trial, best: Trial, tuning: ReadingTuning) -> bool:
-    """Whether a reading explains clearly more, or as much with fewer mistakes."""
-    is_simpler = len(other.reading.mistakes) < len(best.reading.mistakes)
-    return other.loss < best.loss - tuning.least_evidence or (is_simpler and other.loss <= best.loss)
 
 
 def _extend(judge: ReadingJudge, trial: Trial, singles: list[Trial]) -> tuple[Trial, list[Trial]]:
