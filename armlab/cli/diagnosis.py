@@ -102,7 +102,7 @@ def diagnose(
     if motion_only and old is not None:
         from armlab.report.motion.compare_write import compare_motion_recordings
 
-        return compare_motion_recordings((old, *recordings), out, tell_progress)
+        return compare_motion_recordings((old, *recordings), out, _parse_dates(dates), tell_progress)
     if old is not None:
         from armlab.report.changes.comparison_report import compare_recordings
 

@@ -66,6 +66,15 @@ def test_another_load_is_named_in_newton_metres_by_the_known_load_of_the_old_rec
     assert moment.old == pytest.approx(0.1, rel=0.15)
 
 
+def test_a_load_that_grew_at_the_third_recording_is_a_step_there(tmp_path: Path) -> None:
+    loads = {"first": 1.0, "second": 1.0, "third": 2.2}
+    servos = [pendulum(tmp_path / name, 8.0, load, seed) for seed, (name, load) in enumerate(loads.items())]
+    found = compare_load(*servos)
+    assert found is not None
+    assert [(each.effect, each.joint) for each in found.findings] == [("payload", 1)]
+    assert [each.change_point for each in found.trends if each.movement.parameter == "mcx"] == [2]
+
+
 def test_another_gain_is_no_load(tmp_path: Path) -> None:
     """Half the gain doubles all that is read over it."""
     assert compare_load(pendulum(tmp_path / "old", 8.0, 1.0), pendulum(tmp_path / "new", 4.0, 1.0, seed=1)) is None

@@ -18,7 +18,6 @@ from armlab.diagnosis.formats import read_verdict_file
 from armlab.diagnosis.motion.arm_fit import ArmFit, fine_enough, fit_arm
 from armlab.diagnosis.motion.calm_windows import confirm_in_calm_windows, find_calm_windows
 from armlab.diagnosis.motion.choose import ChosenServo, GainOfNumber, choose_servo, learned_errors
-from armlab.diagnosis.motion.compare import compare_motion
 from armlab.diagnosis.motion.couple import coupled_windows
 from armlab.diagnosis.motion.diagnose_motion import diagnose_motion, split_runs
 from armlab.diagnosis.motion.encoder_steps import is_made_by_encoder_steps
@@ -38,7 +37,6 @@ from armlab.diagnosis.motion.windows import Windows, make_windows
 from armlab.identification.model_file import read_model
 from armlab.recordings.motion import load_motion_recording
 from armlab.recordings.recording import MotionRun
-from armlab.report.motion.compare_write import comparison_page, make_motion_comparison
 from armlab.report.motion.motion_page import joint_table, motion_page, untold_table
 from armlab.report.motion.motion_verdict import make_motion_verdict, motion_texts
 from armlab.report.motion.motion_words import error_phrase, motion_lines
@@ -835,43 +833,3 @@ def test_joints_that_do_not_agree_make_a_shared_number_uncertain(soft: Path) -> 
 def test_an_arm_text_has_the_numbers_that_it_is_given() -> None:
     model = mujoco.MjModel.from_xml_string(arm_text(kp=7.0))
     assert model.actuator_gainprm[0, 0] == 7.0
-
-
-def test_a_comparison_names_the_gain_that_was_raised_and_nothing_else(tmp_path: Path) -> None:
-    old = write_recording(tmp_path / "old", TRUTH, seconds=6.0)
-    new = write_recording(tmp_path / "new", {**TRUTH, "kp": 16.0}, seconds=6.0)
-    comparison = compare_motion(load_motion_recording(old), load_motion_recording(new))
-    assert {(each.parameter.key, each.joint) for each in comparison.changed} == {("kp", 1), ("kp", 2)}
-    for each in comparison.changed:
-        assert each.ratio is not None
-        assert each.ratio[0] == pytest.approx(2.0, rel=0.06)
-    file = make_motion_comparison(comparison)
-    assert file.status == "changed"
-    assert "a factor of" in file.summary
-    assert "controller gain" in comparison_page(comparison, "armlab diagnose --compare")
-
-
-def test_an_interval_of_a_change_is_as_wide_as_the_scatter_between_runs(tmp_path: Path) -> None:
-    gains = {"old": (7.0, 8.0, 9.0), "new": (14.0, 16.0, 18.0)}
-    for name, each in gains.items():
-        folder = write_recording(tmp_path / name, {**TRUTH, "kp": each[0]}, seconds=4.0)
-        for seed, gain in enumerate(each, start=1):
-            command = commands(seed, 4.0)
-            truth = {**TRUTH, "kp": gain}
-            columns = simulate(arm_text(**truth), command)
-            table = pd.read_csv(folder / f"run-{seed}.csv").assign(q1=columns[:, 0], q2=columns[:, 1])
-            table.to_csv(folder / f"run-{seed}.csv", index=False)
-    comparison = compare_motion(*(load_motion_recording(tmp_path / name) for name in gains))
-    for joint in (1, 2):
-        (change,) = (each for each in comparison.changes if (each.parameter.key, each.joint) == ("kp", joint))
-        assert change.ratio is not None
-        assert change.ratio[1] < 2.0 < change.ratio[2]
-        assert change.ratio[2] / change.ratio[1] > 1.3  # a gain of 12 % scatter in each of three runs
-
-
-def test_recordings_of_other_kinds_are_not_compared(tmp_path: Path) -> None:
-    folder = write_recording(tmp_path / "one", {}, seconds=4.0)
-    command = ["diagnose", "--compare", str(folder), str(folder), str(folder), "--out", str(tmp_path / "out")]
-    result = CliRunner().invoke(main, command)
-    assert result.exit_code == 2
-    assert "two at a time" in result.output

@@ -18,7 +18,7 @@ from armlab.diagnosis.changes.named import NamedChange, list_table, name_changes
 from armlab.diagnosis.changes.numbers import Change, common_values, list_movements
 from armlab.diagnosis.changes.pooled import Pooled, follow_levels, pool_plainly, pool_recordings, unite_candidates
 from armlab.diagnosis.changes.soundness import SoundChanges, find_sound_changes
-from armlab.diagnosis.changes.trends import Trend, find_trends, recording_date
+from armlab.diagnosis.changes.trends import Trend, find_trends, recording_dates
 from armlab.diagnosis.formats import ComparisonStatus
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Settings
@@ -97,11 +97,7 @@ def compare(
     """
     for other in (new, *more):
         _check_same_robot(old, other)
-    if dates and len(dates) != 2 + len(more):
-        raise InputError(f"{len(dates)} dates for {2 + len(more)} recordings: give one each, or none")
-    known_dates: tuple[date | None, ...] = tuple(dates)
-    if not dates:
-        known_dates = tuple(recording_date(each) for each in (old, new, *more))
+    known_dates = recording_dates((old, new, *more), dates)
     recordings = (old, *(replace(each, arm=old.arm, simulation=old.simulation) for each in (new, *more)))
     own = baseline or model_baseline(old)
 

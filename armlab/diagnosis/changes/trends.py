@@ -8,8 +8,10 @@ from typing import Literal
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.common.errors import InputError
 from armlab.common.probabilities import chi_square_tail
 from armlab.diagnosis.changes.numbers import Movement
+from armlab.recordings.motion import MotionRecording
 from armlab.recordings.recording import Recording
 
 FIRST_EPOCH_S = 5e8  # stamps beyond this count seconds since 1970
@@ -83,8 +85,19 @@ def _fit(movement: Movement, shape: Array) -> tuple[float, float]:
     return float(rest @ precision @ rest), size
 
 
-def recording_date(recording: Recording) -> date | None:
-    """The date that the file gives, or that stamps since 1970 show."""
+def recording_dates(
+    recordings: Sequence[Recording | MotionRecording], dates: Sequence[date]
+) -> tuple[date | None, ...]:
+    """Those that are given; else those that the files give, or that stamps since 1970 show.
+
+    Raises InputError where dates are not as many as recordings.
+    """
+    if dates and len(dates) != len(recordings):
+        raise InputError(f"{len(dates)} dates for {len(recordings)} recordings: give one each, or none")
+    return tuple(dates) or tuple(_recording_date(each) for each in recordings)
+
+
+def _recording_date(recording: Recording | MotionRecording) -> date | None:
     if recording.recorded is not None:
         return recording.recorded
     first = min((float(run.time[0]) for run in recording.runs), default=0.0)

@@ -1,4 +1,4 @@
-"""A changed load of a single joint between two recordings of motion only.
+"""A changed load of a single joint between recordings of motion only.
 
 The torque of such a recording is kp (command - position), so all that one reads from it is over kp. Another gain
 changes gravity and friction by one factor; another load changes gravity and leaves friction alone. With the factors of
@@ -6,11 +6,13 @@ gravity l and of friction f, and their standard errors,
 
     log odds of the load = ((f - l)^2 / (s_f^2 + s_l^2) - (f - 1)^2 / s_f^2) / 2
 
-Where kp is not stated, the load that the robot file gives to the old recording sets the scale.
+They are added over the later recordings. Where kp is not stated, the load that the robot file gives to the old
+recording sets the scale.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from datetime import date
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from armlab.common.arrays import Array
 from armlab.common.errors import DataError
 from armlab.diagnosis.changes.comparison import Comparison, conclude, look_plainly
 from armlab.diagnosis.changes.named import NamedChange
+from armlab.diagnosis.changes.trends import recording_dates
 from armlab.diagnosis.result import Rival
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.rows.simulation import read_simulation
@@ -32,32 +35,36 @@ FIRST_MOMENTS = tuple(f"{name}1" for name in PARAMETER_NAMES[1:4])  # of the lin
 GAIN_EFFECT = "controller_gain_error"
 
 
-def compare_load(old: MotionRecording, new: MotionRecording) -> Comparison | None:
-    """The comparison where a load explains the difference better than a gain does; None where it does not.
+def compare_load(
+    old: MotionRecording, new: MotionRecording, *more: MotionRecording, dates: Sequence[date] = ()
+) -> Comparison | None:
+    """The comparison where a load explains the differences better than a gain does; None where it does not.
 
     Where a gain is out of the question, it may say that nothing changed. It is asked of arms of one joint: the gains of
-    several joints have no common scale.
+    several joints have no common scale. dates: as of `compare_motion`.
     """
     if len(old.arm) != 1 or old.arm.links is None:
         return None
     settings = Settings()
     cutoff_hz = settings.tuning.comparison.plain_cutoff_hz
-    runs = [runs_of_motion(each) for each in (old, new)]
+    moved = (old, new, *more)
+    runs = [runs_of_motion(each) for each in moved]
     try:
-        plain = compare_plain(old.arm, runs[0], runs[1], cutoff_hz)
+        plain = [compare_plain(old.arm, runs[0], later, cutoff_hz) for later in runs[1:]]
     except DataError:
         return None
-    log_odds = load_against_gain(plain, _usual_speed(runs[0], cutoff_hz))
+    speed = _usual_speed(runs[0], cutoff_hz)
+    log_odds = sum(load_against_gain(each, speed) for each in plain)
     if log_odds <= 0:
         return None
-    scale = 1.0 if _kp(old) is not None else newton_metres(old.arm, plain)
-    recordings = [_with_torque(each, own, old, scale) for each, own in zip((old, new), runs, strict=True)]
+    scale = 1.0 if _kp(old) is not None else newton_metres(old.arm, plain[0])
+    recordings = [_with_torque(each, own, old, scale) for each, own in zip(moved, runs, strict=True)]
     simulation = read_simulation(recordings[0], None)
     seen = look_plainly(recordings, simulation, settings)
     if seen is None:
         return None
     notes = () if _kp(old) else ("kp is not stated: the load of the robot file in the old recording sets the scale.",)
-    found = conclude(seen, recordings, (), notes, ())
+    found = conclude(seen, recordings, (), notes, recording_dates(moved, dates))
     if log_odds > settings.tuning.comparison.least_evidence:
         return found
     if not any(each.effect == PAYLOAD_FACTS.id for each in found.findings):

@@ -20,14 +20,6 @@ from armlab.common.report import palette
 from armlab.common.report.charts import (
     FOUND_LOOK,
     GIVEN_LOOK,
-    LAW_LOOK,
-    Axis,
-    Layer,
-    Line,
-    Look,
-    Points,
-    draw_chart,
-    fit_axis,
     shorten_text,
     svg_element,
     svg_picture,
@@ -39,7 +31,6 @@ from armlab.diagnosis.changes.comparison import Comparison, compare
 from armlab.diagnosis.changes.friction_level import ALL_FRICTION
 from armlab.diagnosis.changes.named import ONE_FACTOR, NamedChange
 from armlab.diagnosis.changes.numbers import Change
-from armlab.diagnosis.changes.trends import Trend
 from armlab.diagnosis.formats import (
     COMPARISON_SCHEMA,
     ChangeEntry,
@@ -49,7 +40,6 @@ from armlab.diagnosis.formats import (
     FindingEntry,
     ParameterEntry,
     RivalEntry,
-    TrendEntry,
     kind_of_effect,
 )
 from armlab.diagnosis.settings import Baseline
@@ -60,6 +50,7 @@ from armlab.effects.words import place_in_words
 from armlab.recordings.identifiable import require_identifiable, require_possible
 from armlab.recordings.load import load_recording
 from armlab.report.account.summary import MAX_WORDS
+from armlab.report.changes.trend_report import content_over_recordings, trend_part, trend_phrase
 from armlab.report.torque.content import origin_of
 from armlab.report.torque.torque_verdict import LINE_WIDTH
 from armlab.report.verdict_files import check_output_folder
@@ -206,10 +197,7 @@ def comparison_lines(comparison: Comparison) -> Iterator[str]:
 
 def make_comparison_file(comparison: Comparison) -> ComparisonFile:
     """The content of `comparison.json`."""
-    more_than_two: dict[str, Any] = {}
-    if len(comparison.names) > 2:
-        dates = tuple(None if each is None else each.isoformat() for each in comparison.dates)
-        more_than_two = {"dates": dates, "trends": tuple(_trend_entry(each) for each in comparison.trends)}
+    more_than_two = content_over_recordings(comparison.names, comparison.trends, comparison.dates)
     return ComparisonFile(
         schema=COMPARISON_SCHEMA,
         status=comparison.status,
@@ -224,22 +212,6 @@ def make_comparison_file(comparison: Comparison) -> ComparisonFile:
         smallest_detectable=tuple(_detectable_entry(each) for each in comparison.changes),
         notes=comparison.notes,
         **more_than_two,
-    )
-
-
-def _trend_entry(each: Trend) -> TrendEntry:
-    own = each.movement
-    return TrendEntry(
-        effect=own.effect,
-        joint=own.joint,
-        joints=own.joints,
-        parameter=own.parameter,
-        unit=own.unit,
-        values=tuple(each.values.tolist()),
-        ci95=tuple((low, high) for low, high in each.intervals.tolist()),
-        kind=each.kind,
-        change_point=each.change_point,
-        per_day=each.slope if each.per_day else None,
     )
 
 
@@ -301,8 +273,6 @@ def _detectable_entry(each: Change) -> DetectableEntry:
 TABLE_HEADINGS = ("parameter", "where", "old", "new", "difference, 95 %", "unit", "p", "smallest seen")
 PICTURE_WIDTH, ROW_HEIGHT, NAMES_WIDTH = 372.0, 28.0, 208.0
 MAX_DRAWN_CHANGES = 24
-VALUE_LOOK = Look("value", LAW_LOOK.color, 4.0)
-INTERVAL_LOOK = Look("95 % interval", palette.MIDDLE, 2.0)
 
 
 @dataclass(frozen=True)
@@ -312,15 +282,6 @@ class ChangeCard:
     title: str
     texts: Sequence[str]
     numbers: Table
-
-
-@dataclass(frozen=True)
-class TrendPart:
-    """The parameters that move, in words and pictures. days: of the recordings."""
-
-    texts: Sequence[str]
-    pictures: Sequence[Markup]
-    days: str
 
 
 def comparison_page(comparison: Comparison, command: str) -> str:
@@ -335,7 +296,7 @@ def comparison_page(comparison: Comparison, command: str) -> str:
         verdict=comparison_sentences(comparison),
         changed=_named_table(comparison) if comparison.findings else None,
         cards=[_card(comparison.arm, each, comparison.names) for each in comparison.findings],
-        trends=_trend_part(comparison) if comparison.trends else None,
+        trends=trend_part(comparison.arm, comparison.trends, comparison.names, comparison.dates),
         picture=draw_changes(comparison.arm, changes) if changes else None,
         moved=_changes_table(comparison.arm, [each for each in changes if each.changed]),
         still=_changes_table(comparison.arm, [each for each in changes if not each.changed]),
@@ -369,46 +330,6 @@ def _card(arm: Arm, named: NamedChange, names: Sequence[str]) -> ChangeCard:
     numbers = Table(["change of", "value", "95 % interval", "unit"], rows, (0, 3), stacked=True)
     title = _place_phrase(arm, named)
     return ChangeCard(f"{title[0].upper()}{title[1:]}", texts, numbers)
-
-
-def _trend_part(comparison: Comparison) -> TrendPart:
-    names = comparison.names
-    days = [f"{name}: {'no date' if day is None else day}" for name, day in zip(names, comparison.dates, strict=True)]
-    return TrendPart(
-        [trend_phrase(comparison.arm, each, names) for each in comparison.trends],
-        [draw_trend(comparison.arm, each, names) for each in comparison.trends],
-        "; ".join(days),
-    )
-
-
-def trend_phrase(arm: Arm, trend: Trend, names: Sequence[str]) -> str:
-    """How a parameter moves over the recordings."""
-    own, unit = trend.movement, format_unit(trend.movement.unit)
-    what = (
-        f"{own.parameter} of {effect_in_words(own.effect)} at {place_in_words(arm, own.effect, own.joint, own.joints)}"
-    )
-    values = " to ".join(format_number(float(each)) for each in (trend.values[0], trend.values[-1]))
-    if trend.change_point is not None:
-        return f"{what} changes once, at {names[trend.change_point]}: {values} {unit}".rstrip() + "."
-    if trend.slope is not None:
-        step = "day" if trend.per_day else "recording"
-        return f"{what} moves steadily by {format_number(trend.slope)} {unit} a {step}: {values} {unit}".rstrip() + "."
-    return f"{what} moves up and down, between {format_number(float(trend.values.min()))} and " + (
-        f"{format_number(float(trend.values.max()))} {unit}".rstrip() + "."
-    )
-
-
-def draw_trend(arm: Arm, trend: Trend, names: Sequence[str]) -> Markup:
-    """Values of a parameter over the recordings with their 95 % intervals."""
-    own, count = trend.movement, len(names)
-    x = Axis("recording", 0.5, count + 0.5)
-    y = fit_axis(f"{own.parameter}, {format_unit(own.unit)}", trend.intervals)
-    layers: list[Layer] = [
-        Line(np.full(2, number + 1.0), interval, INTERVAL_LOOK) for number, interval in enumerate(trend.intervals)
-    ]
-    layers.append(Points(np.arange(1.0, count + 1), trend.values, VALUE_LOOK))
-    title = f"{effect_in_words(own.effect)} at {place_in_words(arm, own.effect, own.joint, own.joints)}"
-    return draw_chart(title, x, y, layers, f"{own.parameter} of {title} in {count} recordings")
 
 
 def _changes_table(arm: Arm, changes: Sequence[Change]) -> Table:
@@ -504,9 +425,14 @@ def compare_recordings(
     except DataError as error:
         raise InputError(f"{' and '.join(map(str, folders))}: {error}") from None
     options = [*(["--baseline", baseline] if baseline else []), *(["--seed", str(seed)] if seed else [])]
-    options += ["--dates", ",".join(each.isoformat() for each in dates)] if dates else []
-    command = shlex.join(["armlab", "diagnose", "--compare", *map(str, folders), "--out", str(out), *options])
+    command = comparison_command(folders, out, dates, options)
     return (yield from write_comparison(comparison, out, command))
+
+
+def comparison_command(folders: Sequence[Path], out: Path, dates: Sequence[date], options: Sequence[str] = ()) -> str:
+    """The command that makes a comparison anew."""
+    days = ["--dates", ",".join(each.isoformat() for each in dates)] if dates else []
+    return shlex.join(["armlab", "diagnose", "--compare", *map(str, folders), "--out", str(out), *options, *days])
 
 
 def write_comparison(comparison: Comparison, out: Path, command: str) -> ResultLines:

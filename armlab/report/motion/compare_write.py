@@ -1,14 +1,13 @@
-"""Compares two recordings of motion only and writes comparison.json and a page."""
+"""Compares recordings of motion only and writes comparison.json and a page."""
 
-import shlex
 from collections.abc import Callable, Sequence
+from datetime import date
 from pathlib import Path
 
 from armlab.common.documents import ResultLines
-from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.common.report.page import Table, render_page
-from armlab.common.report.wording import format_unit
+from armlab.common.report.wording import format_unit, join_words
 from armlab.diagnosis.formats import (
     COMPARISON_SCHEMA,
     ChangeEntry,
@@ -24,14 +23,15 @@ from armlab.diagnosis.motion.compare_load import compare_load
 from armlab.diagnosis.motion.motion_tuning import DEFAULT
 from armlab.effects.library import effect_named
 from armlab.recordings.motion import load_motion_recording
-from armlab.report.changes.comparison_report import write_comparison
+from armlab.report.changes.comparison_report import comparison_command, write_comparison
+from armlab.report.changes.trend_report import content_over_recordings, trend_part, trend_phrase
 from problem.arm import Arm
 from problem.joint_words import joint_in_table, joint_in_words
 
 
 def comparison_summary(comparison: MotionComparison) -> str:
     """What changed and by how much."""
-    names = " and ".join(comparison.names)
+    names = join_words(comparison.names)
     if comparison.reason:
         return f"{names} cannot be compared: {comparison.reason}."
     if not comparison.changed:
@@ -44,21 +44,23 @@ def change_phrase(arm: Arm, change: ServoChange) -> str:
     """A change with its numbers."""
     unit, where = format_unit(change.parameter.unit), joint_in_words(arm, change.joint)
     words = f"{effect_named(change.parameter.effect).words} at {where} ({change.parameter.name} from "
-    words += f"{change.old:.4g} to {change.new:.4g} {unit}".rstrip()
+    words += f"{' to '.join(f'{each:.4g}' for each in change.levels.values)} {unit}".rstrip()
+    whole = "in all " if len(change.levels.values) > 2 else ""
     if change.ratio is not None:
-        return f"{words}, a factor of {change.ratio[0]:.4g}, {change.ratio[1]:.4g} to {change.ratio[2]:.4g})"
+        return f"{words}, {whole}a factor of {change.ratio[0]:.4g}, {change.ratio[1]:.4g} to {change.ratio[2]:.4g})"
     low, high = change.difference_interval
-    return f"{words}, a change of {change.difference:.4g}, {low:.4g} to {high:.4g})"
+    return f"{words}, {whole}a change of {change.difference:.4g}, {low:.4g} to {high:.4g})"
 
 
 def make_motion_comparison(comparison: MotionComparison) -> ComparisonFile:
     """The content of `comparison.json`. Errors are of positions, rad (m)."""
+    more_than_two = content_over_recordings(comparison.names, comparison.trends, comparison.dates)
     return ComparisonFile(
         schema=COMPARISON_SCHEMA,
         status="inconclusive" if comparison.reason else "changed" if comparison.changed else "same",
         summary=comparison_summary(comparison),
         old=comparison.names[0],
-        new=comparison.names[1],
+        new=comparison.names[-1],
         recordings=comparison.names,
         level=DEFAULT.max_p_value,
         findings=tuple(_finding(each) for each in comparison.changed),
@@ -75,6 +77,7 @@ def make_motion_comparison(comparison: MotionComparison) -> ComparisonFile:
             for each in comparison.changes
         ),
         notes=comparison.notes,
+        **more_than_two,
     )
 
 
@@ -98,6 +101,7 @@ def _entry(each: ServoChange) -> ChangeEntry:
 
 def _finding(each: ServoChange) -> FindingEntry:
     parameter = ParameterEntry(value=each.difference, ci95=each.difference_interval, unit=each.parameter.unit)
+    levels = " -> ".join(f"{level:.4g}" for level in each.levels.values)
     assert each.before is not None
     assert each.after is not None
     return FindingEntry(
@@ -106,7 +110,7 @@ def _finding(each: ServoChange) -> FindingEntry:
         joint=each.joint,
         joints=(each.joint,),
         parameters={each.parameter.name: parameter},
-        equation=each.parameter.equation.format(joint=each.joint, value=f"{each.old:.4g} -> {each.new:.4g}"),
+        equation=each.parameter.equation.format(joint=each.joint, value=levels),
         heldout_rms_before=each.before,
         heldout_rms_after=each.after,
         p_value=each.p_value,
@@ -121,45 +125,49 @@ def comparison_page(comparison: MotionComparison, command: str) -> str:
             joint_in_table(comparison.arm, each.joint),
             each.parameter.key,
             f"{each.old:.4g}",
-            f"{each.new:.4g}" if each.changed else "unchanged",
+            *(f"{level:.4g}" if each.changed else "unchanged" for level in each.levels.values[1:]),
             f"{each.difference_interval[0]:.3g} to {each.difference_interval[1]:.3g}",
             f"{each.detectable:.3g}",
             format_unit(each.parameter.unit),
         )
         for each in comparison.changes
     ]
-    headings = ("joint", "number", "old", "new", "change, 95 % interval", "smallest change seen", "unit")
+    measures = ("change from first to last, 95 % interval", "smallest change seen", "unit")
+    headings = ("joint", "number", *comparison.names, *measures)
     return render_page(
         __package__,
         "motion_comparison.html",
-        f"Comparison of {' and '.join(comparison.names)}",
+        f"Comparison of {join_words(comparison.names)}",
         status="inconclusive" if comparison.reason else "mismatch" if comparison.changed else "none",
         summary=comparison_summary(comparison),
-        numbers=Table(headings, rows, (1, 6), stacked=True),
+        numbers=Table(headings, rows, (1, len(headings) - 1), stacked=True),
+        trends=trend_part(comparison.arm, comparison.trends, comparison.names, comparison.dates),
         notes=comparison.notes,
         command=command,
     )
 
 
 def compare_motion_recordings(
-    folders: Sequence[Path], out: Path, progress: Callable[[str], None] = lambda message: None
+    folders: Sequence[Path],
+    out: Path,
+    dates: Sequence[date] = (),
+    progress: Callable[[str], None] = lambda message: None,
 ) -> ResultLines:
-    """Compares two recordings, writes comparison.json and comparison.html into `out`, and yields lines to print.
+    """Compares recordings, writes comparison.json and comparison.html into `out`, and yields lines to print.
 
-    Raises InputError, in one line, for recordings that cannot be used, and for more than two.
+    folders, dates: as of `compare_recordings`. Raises InputError, in one line, for recordings that cannot be used.
     """
-    if len(folders) != 2:
-        raise InputError("recordings of motion only are compared two at a time: give one OLD and one NEW")
-    old, new = (load_motion_recording(folder) for folder in folders)
-    command = shlex.join(["armlab", "diagnose", "--compare", *map(str, folders), "--out", str(out)])
-    load = compare_load(old, new)
+    recordings = [load_motion_recording(folder) for folder in folders]
+    command = comparison_command(folders, out, dates)
+    load = compare_load(*recordings, dates=dates)
     if load is not None:
         return (yield from write_comparison(load, out, command))
-    comparison = compare_motion(old, new, progress)
+    comparison = compare_motion(*recordings, dates=dates, progress=progress)
     file = make_motion_comparison(comparison)
     texts = {"comparison.json": file.to_json(), "comparison.html": comparison_page(comparison, command)}
     written = write_texts(texts, out)
     yield f"{file.status.upper()}: {file.summary}"
+    yield from (f"  {trend_phrase(comparison.arm, each, comparison.names)}" for each in comparison.trends)
     yield from (f"  {note}" for note in comparison.notes)
     yield f"wrote {out}: {', '.join(texts)}"
     return file.content() | {"files": written}

@@ -51,12 +51,15 @@ def bench_real_motion(
     if peer_windows is not None:
         beside = peer_section(compare_with_sysid(diagnosis, peer_windows, progress))
         yield from beside
-    pairs = []
     servos = {gain: _open(f"xl330-kp-{gain}", recordings) for gain in XL330_GAINS}
+    progress("comparing all P in one fit")
+    whole = compare_motion(*servos.values())
+    yield f"XL330: {comparison_summary(whole)}"
+    pairs = []
     for old, new in combinations(XL330_GAINS, 2):
         progress(f"comparing P = {old} and {new}")
         comparison = compare_motion(servos[old], servos[new])
-        pairs.append((f"{old} to {new}", f"{new / old:g}", *_pair_cells(comparison)))
+        pairs.append((f"{old} to {new}", f"{new / old:g}", *_pair_cells(comparison), _factor_of_all(whole, old, new)))
         yield f"XL330: {comparison_summary(comparison)}"
     page = markdown_page(
         "Real recordings of motion only",
@@ -73,8 +76,10 @@ def bench_real_motion(
         table,
         *beside,
         "## XL330 with a pendulum, gain register P = 100, 200, 400, 800",
-        "Nothing but P was changed. Factor: of kp, with its 95 % interval.",
-        markdown_table(("pair", "true factor", "factor found", "other changes named"), pairs),
+        "Nothing but P was changed. Factor: of kp, with its 95 % interval; of the two recordings alone, and of all "
+        "four in one fit.",
+        markdown_table(("pair", "true factor", "of two", "other changes named", "of all four"), pairs),
+        comparison_summary(whole),
     )
     write_texts({"motion.md": page}, results)
     yield f"wrote {results / 'motion.md'}"
@@ -201,3 +206,10 @@ def _pair_cells(comparison: MotionComparison) -> tuple[str, str]:
         if each.parameter.key != "kp"
     ]
     return factor, ", ".join(others) or "none"
+
+
+def _factor_of_all(comparison: MotionComparison, old: int, new: int) -> str:
+    """The factor of kp between two of the four recordings that were fitted together."""
+    kp = next(each for each in comparison.changes if each.parameter.key == "kp")
+    value, low, high = kp.levels.between(XL330_GAINS.index(old), XL330_GAINS.index(new)).factor
+    return f"{value:.2f} ({low:.2f} to {high:.2f})"
