@@ -11,10 +11,10 @@ from servo_arms import arm_text, commands, simulate, write_recording
 
 from armlab.cli.main import main
 from armlab.diagnosis.motion.choose import ChosenServo
-from armlab.diagnosis.motion.compare import FittedLevels, common_start, compare_motion, fit_shared
+from armlab.diagnosis.motion.compare import FittedLevels, ServoChange, common_start, compare_motion, fit_shared
 from armlab.diagnosis.motion.estimate import ServoFit, from_coordinates, to_coordinates
 from armlab.diagnosis.motion.motion_tuning import DEFAULT
-from armlab.diagnosis.motion.servo import HIGHEST, LOWEST, NEUTRAL, place
+from armlab.diagnosis.motion.servo import HIGHEST, LOWEST, NEUTRAL, PARAMETERS, place
 from armlab.diagnosis.motion.servo_simulation import read_servo_simulation
 from armlab.diagnosis.motion.windows import make_windows
 from armlab.recordings.motion import load_motion_recording
@@ -57,7 +57,7 @@ def test_an_interval_of_a_change_is_as_wide_as_the_scatter_between_runs(tmp_path
 
 def test_a_gain_that_was_raised_at_the_third_of_three_recordings_is_a_step_there(tmp_path: Path) -> None:
     truths = {"first": TRUTH, "second": TRUTH, "third": {**TRUTH, "kp": 16.0}}
-    folders = [str(write_recording(tmp_path / name, truth, seconds=4.0)) for name, truth in truths.items()]
+    folders = [str(write_recording(tmp_path / name, truth, seconds=6.0)) for name, truth in truths.items()]
     days = ["--dates", "2026-01-31,2026-02-28,2026-03-31"]
     result = CliRunner().invoke(main, ["diagnose", "--compare", *folders, *days, "--out", str(tmp_path / "out")])
     assert result.exit_code == 0
@@ -103,6 +103,13 @@ def test_a_number_that_differs_between_any_two_recordings_differs() -> None:
     levels = levels_of_kp([2.0, 4.0, 2.0], 0.03, 0.0)
     assert levels.between(0, 2).chance == 1.0
     assert levels.chance_of_same() < 1e-20
+
+
+def test_a_number_of_which_no_possible_change_would_be_seen_is_not_told() -> None:
+    levels = levels_of_kp([2.0, 4.0], 0.03, 0.0)
+    told, untold = (ServoChange(PARAMETERS[levels.number], 1, levels, 1.0, False, each) for each in (0.5, 7e21))
+    assert told.is_told
+    assert not untold.is_told
 
 
 def test_a_drive_with_damping_lends_the_joints_own_to_the_others() -> None:

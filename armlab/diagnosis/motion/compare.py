@@ -160,6 +160,11 @@ class ServoChange:
         return self.levels.between(0, -1).factor if LOGARITHMIC[self.levels.number] else None
 
     @property
+    def is_told(self) -> bool:
+        """Whether the motions tell a change of this number that a servo can have."""
+        return bool(self.detectable < HIGHEST[self.levels.number] - LOWEST[self.levels.number])
+
+    @property
     def difference(self) -> float:
         """Last less first, SI units."""
         return self._differences[0]

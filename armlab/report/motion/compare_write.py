@@ -75,6 +75,7 @@ def make_motion_comparison(comparison: MotionComparison) -> ComparisonFile:
                 share=each.detectable / abs(each.old) if each.old else None,
             )
             for each in comparison.changes
+            if each.is_told
         ),
         notes=comparison.notes,
         **more_than_two,
@@ -126,8 +127,8 @@ def comparison_page(comparison: MotionComparison, command: str) -> str:
             each.parameter.key,
             f"{each.old:.4g}",
             *(f"{level:.4g}" if each.changed else "unchanged" for level in each.levels.values[1:]),
-            f"{each.difference_interval[0]:.3g} to {each.difference_interval[1]:.3g}",
-            f"{each.detectable:.3g}",
+            f"{each.difference_interval[0]:.3g} to {each.difference_interval[1]:.3g}" if each.is_told else "not told",
+            f"{each.detectable:.3g}" if each.is_told else "not told",
             format_unit(each.parameter.unit),
         )
         for each in comparison.changes
