@@ -220,7 +220,8 @@ class TorqueBend(Term):
     def parameters(self, coefficients: Array) -> dict[str, Value]:
         """The highest reading, where the bent line is level, and where the bend begins."""
         knee = self.shape[0]
-        return {"limit": knee * (1 + 0.25 / float(coefficients[0])), "knee": knee}
+        share = float(coefficients[0])
+        return {"limit": knee * (1 + 0.25 / share) if share else float("inf"), "knee": knee}
 
     def unit(self, name: str) -> str:
         """Unit of a parameter; the knee has that of the limit."""

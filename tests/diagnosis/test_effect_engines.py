@@ -11,6 +11,7 @@ from random_arms import random_arm
 
 from armlab.common.arrays import Array
 from armlab.effects.contract import Scene
+from armlab.effects.library import BUILT_IN
 from problem.arm import Arm, Link
 from problem.pseudo_inertia import link_from_centre_of_mass
 from problem.transforms import rotation_x, translation
@@ -185,3 +186,12 @@ def _carry(model: Any, own: int, following: int, change: Array) -> None:
     for place, turn in pairs:
         place[:] = change[:3, :3] @ place + change[:3, 3]
         mujoco.mju_mulQuat(turn, quaternion, turn.copy())
+
+
+def test_a_law_that_a_fit_sizes_with_zero_has_parameters() -> None:
+    """No limit is one at infinity."""
+    scenes = [scene(seconds=4.0)]
+    for each in BUILT_IN:
+        for places in each.candidates(scenes[0].arm, scenes):
+            law = places[0]
+            assert law.parameters(np.zeros(law.size))
