@@ -27,7 +27,7 @@ from armlab.diagnosis.changes import soundness
 from armlab.diagnosis.changes.comparison import Comparison, compare, look_plainly
 from armlab.diagnosis.changes.friction_level import ALL_FRICTION
 from armlab.diagnosis.changes.numbers import Change, laws_of
-from armlab.diagnosis.changes.pooled import pool_plainly, unite_candidates
+from armlab.diagnosis.changes.pooled import unite_candidates
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.predict.found_model import model_found
 from armlab.diagnosis.torque.rows.simulation import read_simulation
@@ -112,7 +112,7 @@ def test_levels_in_common_are_those_of_the_robot() -> None:
     for each in rows:
         assert each.levels is not None
         assert each.joint is not None
-        assert np.mean(each.levels) == pytest.approx(VISCOUS[each.joint - 1], rel=0.01)
+        assert np.mean(each.levels) == pytest.approx(VISCOUS[each.joint - 1], rel=0.015)
 
 
 def test_friction_that_fell_is_named_with_its_percent() -> None:
@@ -178,13 +178,6 @@ def test_both_laws_of_friction_that_changed_are_one_cause_with_a_row_each() -> N
     assert sizes.keys() == {"coulomb_friction", "viscous_friction"}
     assert sizes["coulomb_friction"][0] < 0.5 < sizes["coulomb_friction"][1]
     assert sizes["viscous_friction"][0] < -0.3 < sizes["viscous_friction"][1]
-
-
-def test_a_single_run_that_tells_nothing_of_its_scatter_needs_more_evidence() -> None:
-    old, new = recording("cold", 0), recording("again", 10)
-    simulation = read_simulation(old, None)
-    alone = pool_plainly([one_run(old, old.runs[0]), new], simulation, Settings())
-    assert alone.tuning.level < pool_plainly([old, new], simulation, Settings()).tuning.level
 
 
 def test_intervals_of_unchanged_parameters_hold_zero() -> None:

@@ -92,11 +92,16 @@ class ChangeTable:
         return cache(lambda chosen: self.mixed.held_out_errors(self.columns_with(sorted(chosen))))
 
     @cached_property
-    def degrees(self) -> int:
-        """Degrees of freedom of the scatter between stretches: those of the recording with the fewest."""
-        pairs = [np.column_stack([each.rows.members, each.rows.stretches]) for each in self.mixed.joints]
-        owners = np.unique(np.concatenate(pairs), axis=0)[:, 0]
-        return max(int(np.bincount(owners, minlength=len(self.contrast)).min()) - 1, 1)
+    def degrees(self) -> float:
+        """Degrees of freedom of the scatter between stretches: those of the recording with the fewest.
+
+        Stretches of unequal weight count as fewer (Kish 1965).
+        """
+        rows = [np.column_stack([each.rows.members, each.rows.stretches]) for each in self.mixed.joints]
+        pairs, place = np.unique(np.concatenate(rows), axis=0, return_inverse=True)
+        weights = np.bincount(place, np.concatenate([each.rows.weights for each in self.mixed.joints]))
+        sums, squares = (np.bincount(pairs[:, 0], each) for each in (weights, weights**2))
+        return max(float(np.min(sums**2 / squares)) - 1, 1.0)
 
     def degrees_with(self, share: float) -> float:
         """The same where a share of a variance is that between runs, of which there are few (Satterthwaite 1946)."""
@@ -333,20 +338,22 @@ def _weighted_rows(parts: _CommonColumns, joint: int, friction: Array | None) ->
     runs = np.repeat(np.arange(len(pooled.owner)), [len(each.torque) for each in observed.signals])[rows]
     members = pooled.members[rows]
     wave = np.arange(slow.shape[1]) % (pooled.tuning.drift_waves + 1) > 0
+    weight = np.sqrt(pooled.shared[rows, joint])
     drifts = [(slow[rows], wave)]
     if _runs_to_spare(runs, members) > 0:
         drifts.append((slow[rows][:, ~wave], wave[~wave]))
     return weigh_rows(
         JointRows(
-            columns=np.column_stack(parts.values[joint])[rows],
+            columns=weight[:, None] * np.column_stack(parts.values[joint])[rows],
             index=np.concatenate(parts.numbers[joint]),
-            target=pooled.design.target[rows, joint],
-            random=tuple(part * factor for part, _ in drifts for factor in (1.0, level[rows, None])),
+            target=weight * pooled.design.target[rows, joint],
+            random=tuple(weight[:, None] * part * factor for part, _ in drifts for factor in (1.0, level[rows, None])),
             waves=np.concatenate([np.tile(kind, 2) for _, kind in drifts]),
-            known=_drift_of_gain(pooled, joint)[rows],
+            known=weight[:, None] * _drift_of_gain(pooled, joint)[rows],
             stretches=pooled.stretches[rows],
             runs=runs,
             members=members,
+            weights=weight**2,
         )
     )
 

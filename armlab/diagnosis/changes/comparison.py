@@ -28,6 +28,11 @@ from armlab.recordings.recording import Recording
 from problem.arm import Arm
 
 RUNS_DIFFER = "The runs of one recording differ as much as the recordings do: record more runs of each."
+OTHER_STATES = (
+    "The recordings differ, but move in other places or at other speeds, where the model may lack something else: "
+    "record the same motion again."
+)
+SHARED = 0.99  # share of the rows from which on all recordings were in the same states
 GEOMETRY_TOLERANCE = 1e-6  # rad (m): geometry that counts as that of the same robot
 
 
@@ -38,8 +43,8 @@ class Comparison:
     findings: what changed, the surest first. changes: every parameter compared.
 
     reason: of an inconclusive comparison. doubtful: what makes it so where the runs of one recording differ as much as
-    the recordings. notes: sentences on what was not used. trends: of more than two recordings,
-    each parameter that moves; dates: of the recordings.
+    the recordings, or these were in other states. notes: sentences on what was not used. trends: of more than two
+    recordings, each parameter that moves; dates: of the recordings.
     """
 
     status: ComparisonStatus
@@ -133,7 +138,9 @@ def compare_with(
             pooled = pool_recordings(recordings, unite_candidates(diagnoses), simulation, settings)
         except DataError as error:
             return replace(none, reason=str(error))
-        seen = _look(pooled, make_table)
+        plainly, seen = seen, _look(pooled, make_table)
+        if plainly is not None and plainly.sound.elsewhere and not seen.sound.named:
+            seen = plainly
     return conclude(seen, recordings, diagnoses, tuple(_notes(recordings, baseline)), dates)
 
 
@@ -155,14 +162,26 @@ def look_plainly(recordings: Sequence[Recording], simulation: Simulation, settin
 
 
 def _look(pooled: Pooled, table_of: Callable[[Pooled], ChangeTable]) -> ChangeLook:
-    """The changes, with columns that follow what is common beside them."""
+    """The changes, with columns that follow what is common beside them.
+
+    Where too few rows are in states that all recordings were in, there are none.
+    """
     table = table_of(pooled)
-    sound = find_sound_changes(pooled, table)
+    few = pooled.shared_share < pooled.tuning.least_shared
+    sound = SoundChanges(()) if few else find_sound_changes(pooled, table)
     if sound.named:
         pooled = follow_levels(pooled, common_values(table, sound.named)[table.model])
         table = table_of(pooled)
         sound = find_sound_changes(pooled, table)
-    return ChangeLook(pooled, table, sound)
+    if sound.named or sound.doubtful is not None or pooled.shared_share > SHARED:
+        return ChangeLook(pooled, table, sound)
+    every = replace(pooled, only_shared=False)
+    table_of_all = table_of(every)
+    found = find_sound_changes(every, table_of_all).named
+    surest = max(found, key=table_of_all.log_odds, default=None)
+    if surest is None:
+        return ChangeLook(pooled, table, sound)
+    return ChangeLook(every, table_of_all, SoundChanges((), surest, elsewhere=True))
 
 
 def conclude(
@@ -183,7 +202,7 @@ def conclude(
         tuple(diagnoses),
         named,
         list_table(pooled, table, sound.named),
-        reason=RUNS_DIFFER if doubtful else "",
+        reason="" if not doubtful else OTHER_STATES if sound.elsewhere else RUNS_DIFFER,
         doubtful=next(iter(doubtful), None),
         notes=notes,
         trends=_find_trends(pooled, table, sound.named, dates),

@@ -29,7 +29,7 @@ def friction_changes(pooled: Pooled, table: ChangeTable, found: Sequence[Tested]
 
 
 def _friction_change(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], changed: Sequence[Tested]) -> Change:
-    """All friction of a joint as one level, N m (N): the root mean square of its torque over the rows.
+    """All friction of a joint as one level, N m (N): the root mean square of its torque over the rows that count.
 
     A run's level is what its torque has of the friction of the common model, everything else held. The interval is that
     of the scatter between runs, or between stretches of time where that is larger. changed: laws of this joint.
@@ -49,7 +49,7 @@ def _friction_change(pooled: Pooled, table: ChangeTable, found: Sequence[Tested]
     spare = sum(int(np.sum(of_run == each)) - 1 for each in (0, last))
     if min(np.sum(of_run == 0), np.sum(of_run == last)) > 1:
         errors.append(half_width_factor(spare) * _error_of_difference(by_run, of_run, last))
-    size, half = float(np.sqrt(np.mean(mean**2))), max(errors)
+    size, half = float(np.sqrt(mean @ mean / rows.weights.sum())), max(errors)
     levels = tuple(size * float(by_run[of_run == each].mean()) for each in range(pooled.recordings))
     change = levels[-1] - levels[0]
     return Change(

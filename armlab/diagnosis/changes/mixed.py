@@ -32,7 +32,8 @@ class JointRows:
 
     columns: (rows, own), index: (own,) their numbers among all. target: (rows,). random: parts (rows, count), one
     variance a part. waves: (count of all,), False for constants of a run. known: (rows, count), random columns of known
-    size. stretches, runs, members: (rows,), stretch of time, run and recording of each row.
+    size. stretches, runs, members: (rows,), stretch of time, run and recording of each row. weights: (rows,), of the
+    squares; columns and target are times their roots.
     """
 
     columns: Array
@@ -44,6 +45,7 @@ class JointRows:
     stretches: NDArray[np.intp]
     runs: NDArray[np.intp]
     members: NDArray[np.intp]
+    weights: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +100,7 @@ def _restricted_variances(rows: JointRows) -> tuple[float, tuple[float, ...]]:
     random = np.column_stack([*rows.random, rows.known])
     random = random - basis @ (basis.T @ random)
     gram, towards, power = random.T @ random, random.T @ left, float(left @ left)
-    free = max(len(left) - basis.shape[1], 1)
+    free = max(float(rows.weights.sum()) - basis.shape[1], 1.0)
     least = free * max(LEAST_NOISE**2 * float(np.mean(rows.target**2)), 1e-300)
     sizes = [part.shape[1] for part in (*rows.random, rows.known)]
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.errors import DataError
+from armlab.diagnosis.changes.shared_states import shared_weights
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.columns.columns import Block, Place, place_of
@@ -48,13 +49,14 @@ class Pooled:
     """Recordings in one design, and the common model fitted to all of them.
 
     owner: of each run, the recording that it is of, from 0. recordings: how many there are. changes: the columns of
-    everything that may have changed.
+    everything that may have changed. only_shared: whether rows count as `shared` says, else all alike.
     """
 
     model: FittedModel
     owner: tuple[int, ...]
     recordings: int
     changes: tuple[Block, ...]
+    only_shared: bool = True
 
     @property
     def design(self) -> DesignMatrix:
@@ -101,6 +103,26 @@ class Pooled:
             place = np.clip(np.searchsorted(theirs, clock), 0, len(theirs) - 1)
             numbers[starts[run] : starts[run + 1]] = numbers[starts[first] : starts[first + 1]][place]
         return np.asarray(np.unique(numbers, return_inverse=True)[1], dtype=np.intp)
+
+    @cached_property
+    def shared(self) -> Array:
+        """How much each row of a joint counts, (rows, joints): less where one recording alone had such positions of the
+        arm and speeds of the joint.
+
+        What the model lacks differs from place to place, and would be a change between recordings of other places.
+        """
+        if not self.only_shared:
+            return np.ones((self.observed.rows, self.observed.joints))
+        position, speed = self.observed.kept("position"), np.abs(self.observed.kept("velocity"))
+        squares = (position - position.mean(axis=0)) ** 2
+        stretches = len(np.unique(self.stretches))
+        states = [np.column_stack([position, *own]) for own in zip(squares.T, speed.T, strict=True)]
+        return np.column_stack([shared_weights(each, self.members, stretches) for each in states])
+
+    @cached_property
+    def shared_share(self) -> float:
+        """Share of the rows that count, of the recording with the smallest."""
+        return min(float(self.shared[self.members == each].mean()) for each in range(self.recordings))
 
     def _first_of_motion(self) -> list[int]:
         """For each run the first run of another recording that follows the same motion; itself where there is none."""
@@ -155,9 +177,7 @@ def pool_plainly(recordings: Sequence[Recording], simulation: Simulation, settin
         held_out_blocks=2,
         held_out_every=2,
     )
-    single = min(len(recordings[0].runs), len(recordings[-1].runs)) < 2
-    level = tuning.comparison.single_run_level if single else tuning.comparison.level
-    plain = replace(tuning, data=data, comparison=replace(tuning.comparison, drift_waves=0, level=level))
+    plain = replace(tuning, data=data, comparison=replace(tuning.comparison, drift_waves=0))
     return pool_recordings(recordings, (), simulation, replace(settings, tuning=plain))
 
 

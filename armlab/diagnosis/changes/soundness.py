@@ -23,11 +23,13 @@ INERTIA_STATES = 50  # a run
 @dataclass(frozen=True)
 class SoundChanges:
     """named: the changes, fitted together. doubtful: where there are none, the likeliest change of those by which the
-    runs of one recording differ as much, fitted alone.
+    runs of one recording differ as much, fitted alone. elsewhere: whether it is one instead that is sure only among
+    rows of states in which not all recordings were.
     """
 
     named: tuple[Tested, ...]
     doubtful: Tested | None = None
+    elsewhere: bool = False
 
 
 def find_sound_changes(pooled: Pooled, table: ChangeTable) -> SoundChanges:
