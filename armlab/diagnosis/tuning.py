@@ -525,6 +525,13 @@ class ComparisonTuning:
     level: float = tuned(
         0.01, "of a false change in all that is compared", "probability", source="convention", most=1.0
     )
+    single_run_level: float = tuned(
+        1e-5,
+        "the same of a change of links and friction where one recording has no second run to differ from",
+        "probability",
+        source="run against run of real arms with nothing changed: 1e-4 to 9e-3 where something was named",
+        most=1.0,
+    )
     least_shared: float = tuned(
         0.25,
         "in states that all recordings were in; where fewer are, no change is told from what the model lacks elsewhere",

@@ -27,7 +27,7 @@ from armlab.diagnosis.changes import soundness
 from armlab.diagnosis.changes.comparison import Comparison, compare, look_plainly
 from armlab.diagnosis.changes.friction_level import ALL_FRICTION
 from armlab.diagnosis.changes.numbers import Change, laws_of
-from armlab.diagnosis.changes.pooled import unite_candidates
+from armlab.diagnosis.changes.pooled import pool_plainly, unite_candidates
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.predict.found_model import model_found
 from armlab.diagnosis.torque.rows.simulation import read_simulation
@@ -106,7 +106,10 @@ def test_two_recordings_of_an_unchanged_robot_are_the_same() -> None:
 
 
 def test_levels_in_common_are_those_of_the_robot() -> None:
-    """A torque constant that may drift makes them wider, not smaller."""
+    """A torque constant that may drift makes them wider, not smaller.
+
+    Joint 3 comes out 1.2 % high from one recording alone, where all rows count.
+    """
     rows = [each for each in comparison("same").changes if each.effect == "viscous_friction"]
     assert len(rows) == len(ARM)
     for each in rows:
@@ -178,6 +181,13 @@ def test_both_laws_of_friction_that_changed_are_one_cause_with_a_row_each() -> N
     assert sizes.keys() == {"coulomb_friction", "viscous_friction"}
     assert sizes["coulomb_friction"][0] < 0.5 < sizes["coulomb_friction"][1]
     assert sizes["viscous_friction"][0] < -0.3 < sizes["viscous_friction"][1]
+
+
+def test_a_single_run_that_tells_nothing_of_its_scatter_needs_more_evidence() -> None:
+    old, new = recording("cold", 0), recording("again", 10)
+    simulation = read_simulation(old, None)
+    alone = pool_plainly([one_run(old, old.runs[0]), new], simulation, Settings())
+    assert alone.tuning.level < pool_plainly([old, new], simulation, Settings()).tuning.level
 
 
 def test_intervals_of_unchanged_parameters_hold_zero() -> None:
@@ -257,7 +267,7 @@ def test_the_friction_that_differs_between_two_runs_is_what_constant_speed_shows
     found = compare(*(one_run(whole, run) for run in whole.runs))
     (named,) = found.findings
     changes = {each.parameter: np.array(each.interval) for each in named.changes}
-    assert set(changes) == {"level", "coefficient"}
+    assert {"positive", "negative"} <= set(changes) <= {"level", "positive", "negative"}
     forces, speeds = [], []
     for run in whole.runs:
         step = float(np.median(np.diff(run.time)))
@@ -265,7 +275,8 @@ def test_the_friction_that_differs_between_two_runs_is_what_constant_speed_shows
         steady = (np.abs(speed) > 0.08) & (np.abs(acceleration) < 0.03)
         forces.append(np.mean(np.sign(speed[steady]) * run.torque[steady, 0]))
         speeds.append(np.mean(np.abs(speed[steady])))
-    low, high = changes["level"] + changes["coefficient"] * np.mean(speeds)
+    slopes = (changes["positive"] + changes["negative"]) / 2
+    low, high = changes.get("level", np.zeros(2)) + slopes * np.mean(speeds)
     assert low < forces[1] - forces[0] < high
 
 

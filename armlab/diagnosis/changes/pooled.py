@@ -177,7 +177,9 @@ def pool_plainly(recordings: Sequence[Recording], simulation: Simulation, settin
         held_out_blocks=2,
         held_out_every=2,
     )
-    plain = replace(tuning, data=data, comparison=replace(tuning.comparison, drift_waves=0))
+    single = min(len(recordings[0].runs), len(recordings[-1].runs)) < 2
+    level = tuning.comparison.single_run_level if single else tuning.comparison.level
+    plain = replace(tuning, data=data, comparison=replace(tuning.comparison, drift_waves=0, level=level))
     return pool_recordings(recordings, (), simulation, replace(settings, tuning=plain))
 
 

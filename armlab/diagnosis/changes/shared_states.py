@@ -1,4 +1,4 @@
-"""Rows of recordings in states that all of them were in: only there is a difference no matter of where they were."""
+"""How far the rows of recordings are in states that all recordings were in: elsewhere a model may lack other things."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -23,8 +23,8 @@ INERTIA_STATES = 50  # a run
 @dataclass(frozen=True)
 class SoundChanges:
     """named: the changes, fitted together. doubtful: where there are none, the likeliest change of those by which the
-    runs of one recording differ as much, fitted alone. elsewhere: whether it is one instead that is sure only among
-    rows of states in which not all recordings were.
+    runs of one recording differ as much, fitted alone. elsewhere: the doubtful change is another one, sure only where
+    rows count whose states not all recordings were in.
     """
 
     named: tuple[Tested, ...]
