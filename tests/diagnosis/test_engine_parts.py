@@ -248,6 +248,26 @@ def test_noise_of_the_encoder_is_no_spring_that_the_bodies_drive() -> None:
     assert not any(is_structured(each, TUNING) for each in predict_residual_structure(model, model.noise))
 
 
+def test_a_recording_of_which_too_little_motion_is_held_out_is_too_short(observed: Observed) -> None:
+    """The runs that identify are long enough by themselves."""
+    identify, validate = (
+        max(each.stop - each.start for joint in range(3) for each in observed.of_role(role, joint)) for role in ROLES
+    )
+    least = min(identify, validate) + 1
+    for role, other in (("identify", "validate"), ("validate", "identify")):
+        segments = [
+            replace(each, stop=min(each.stop, each.start + least - 1)) if each.role == role else each
+            for each in observed.segments
+        ]
+        moving = np.ones_like(observed.moving)
+        short = replace(observed, segments=tuple(segments), moving=moving, min_segment_rows=least)
+        assert not short.of_role(role, 0)
+        assert short.of_role(other, 0)
+        reason = short.reason_too_short(cases.recording(seconds=6.0).arm)
+        assert reason is not None
+        assert "record longer runs" in reason
+
+
 def test_features_of_a_joint_that_carries_nothing_find_nothing(observed: Observed) -> None:
     rng = np.random.default_rng(3)
     left = 0.05 * rng.standard_normal((observed.rows, 3))

@@ -201,8 +201,11 @@ class Observed:
         return rows_in(self.of_role("validate", joint), self.rows)
 
     def reason_too_short(self, arm: Arm) -> str | None:
-        """Why nothing can be said of a joint: it is never in motion for long enough; None where all are."""
-        short = [joint + 1 for joint in range(self.joints) if not self.used(joint)]
+        """Why nothing can be said of a joint: it is never in motion for long enough in what is fitted, or in what is
+        held out; None where all are.
+        """
+        roles = [role for role in ROLES if self.of_role(role)]
+        short = [joint + 1 for joint in range(self.joints) if not all(self.of_role(role, joint) for role in roles)]
         if not short:
             return None
         least = self.min_segment_rows / self.rate_hz
