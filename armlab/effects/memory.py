@@ -380,14 +380,14 @@ DRIFT_FORMS = (ViscousDrift, CoulombDrift, HeatedFriction, ThermometerFriction)
 
 @dataclass(frozen=True)
 class DriftFamily(TermFamily):
-    """Drift by time and heat at each joint, runs cold or following one another; by temperature where recorded."""
+    """Drift by time and heat at each joint, runs cold or in turn as stamped; by temperature where recorded."""
 
     facts: Effect = FRICTION_DRIFT_FACTS
     terms: tuple[type[Term], ...] = DRIFT_FORMS
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
         """Several forms a joint."""
-        clocks = [()] if len(scenes) == 1 else [(), _run_starts(scenes)]
+        clocks = dict.fromkeys([(), _run_starts(scenes)])
         total = sum(float(scene.time[-1]) for scene in scenes)
         found: list[list[Candidate]] = []
         for joint in (joint for joint in range(1, len(arm) + 1) if joint_moves(scenes, joint)):
@@ -401,9 +401,14 @@ class DriftFamily(TermFamily):
 
 
 def _run_starts(scenes: Sequence[Scene]) -> tuple[tuple[str, float], ...]:
-    """Seconds before each run, as if they followed one another, and before one that comes after them."""
-    ends = np.cumsum([0.0, *(float(scene.time[-1] + scene.step) for scene in scenes)])
-    return tuple(zip([*(scene.run for scene in scenes), ""], ends.tolist(), strict=True))
+    """Seconds before each run, and before one that comes after them; empty where no stamps say which came first."""
+    in_turn = sorted(scenes, key=lambda scene: scene.start)
+    ends = [scene.start + float(scene.time[-1]) for scene in in_turn]
+    if len(in_turn) == 1 or any(after.start <= end for after, end in zip(in_turn[1:], ends, strict=False)):
+        return ()
+    starts = [scene.start for scene in in_turn] + [ends[-1] + in_turn[-1].step]
+    names = [scene.run for scene in in_turn] + [""]
+    return tuple((name, start - starts[0]) for name, start in zip(names, starts, strict=True))
 
 
 def _thermometer_candidates(arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[list[Candidate]]:

@@ -25,7 +25,8 @@ class Scene:
     model. torque: (samples, joints), what the present model predicts, friction included, faults of the torque's
     channel left out, N m (N). temperature: (samples, sensors), degrees Celsius; link_position: (samples, joints),
     rad (m); None where the run has none. beside: (samples, joints), N m (N), torque simulated elsewhere that the model
-    adds to; None where the model is the whole torque.
+    adds to; None where the model is the whole torque. start: stamp of the first sample, s, on the clock of the
+    recording.
     """
 
     run: str
@@ -37,6 +38,7 @@ class Scene:
     temperature: Array | None = None
     link_position: Array | None = None
     beside: Array | None = None
+    start: float = 0.0
 
     def __post_init__(self) -> None:
         """Make the arrays read-only for laws: what one writes, all others would see."""
@@ -124,8 +126,9 @@ def _read_only(values: Array) -> Array:
 
 def scene_of(run: Run, motion: Motion, arm: Arm) -> Scene:
     """The scene of a run that is even in time and of its motion, before any model: links and torque are zeros."""
-    zero, time = np.zeros(motion.position.shape), run.time - run.time[0]
-    return Scene(run.name, time, motion, arm, np.zeros(10 * len(arm)), zero, run.temperature, run.link_position)
+    zero, start = np.zeros(motion.position.shape), float(run.time[0])
+    links, sensors = np.zeros(10 * len(arm)), (run.temperature, run.link_position)
+    return Scene(run.name, run.time - start, motion, arm, links, zero, *sensors, start=start)
 
 
 def instants(arm: Arm, motion: Motion, inertial: Array | None = None) -> Scene:

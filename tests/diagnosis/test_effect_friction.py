@@ -187,14 +187,24 @@ def test_drift_goes_from_its_initial_to_its_final_coefficient() -> None:
     assert ratio[250] == pytest.approx(3.0 - (1 - np.exp(-1)), abs=1e-9)
 
 
-def test_drift_goes_on_in_the_next_run_where_runs_follow_one_another() -> None:
-    scenes = [scene(seed=seed, run=f"run-{seed}.csv") for seed in (1, 2)]
-    clocks = {place[0].began for place in family("friction_drift").candidates(scenes[0].arm, scenes)}
-    assert clocks == {(), (("run-1.csv", 0.0), ("run-2.csv", 8.0), ("", 16.0))}
-    drift = ViscousDrift.at(scenes[0].arm, 1, shape=(10.0,), began=max(clocks))
-    assert drift.warmth(scenes[1])[0] == pytest.approx(1 - np.exp(-0.8))
-    later = replace(scenes[1], run="unheard-of.csv")
-    assert drift.warmth(later)[0] == pytest.approx(1 - np.exp(-1.6))
+def clocks_of_drift(*starts: float) -> set[tuple[tuple[str, float], ...]]:
+    """The clocks of drift over two runs of 8 s that begin at these stamps."""
+    scenes = [replace(scene(seed=seed, run=f"run-{seed}.csv"), start=start) for seed, start in enumerate(starts)]
+    return {place[0].began for place in family("friction_drift").candidates(scenes[0].arm, scenes)}
+
+
+def test_drift_goes_on_in_the_run_that_is_stamped_later() -> None:
+    clocks = clocks_of_drift(110.0, 100.0)
+    assert min(clocks) == ()
+    assert max(clocks) == (("run-1.csv", 0.0), ("run-0.csv", 10.0), ("", pytest.approx(18.0, abs=0.01)))
+    later = scene(seed=0, run="run-0.csv")
+    drift = ViscousDrift.at(later.arm, 1, shape=(10.0,), began=max(clocks))
+    assert drift.warmth(later)[0] == pytest.approx(1 - np.exp(-1.0))
+    assert drift.warmth(replace(later, run="unheard-of.csv"))[0] == pytest.approx(1 - np.exp(-1.8), abs=1e-3)
+
+
+def test_runs_that_are_stamped_at_the_same_time_are_taken_as_cold() -> None:
+    assert clocks_of_drift(0.0, 0.0) == clocks_of_drift(0.0, 7.9) == clocks_of_drift(0.0) == {()}
 
 
 def test_heat_is_the_lagged_power_of_friction() -> None:
