@@ -89,7 +89,7 @@ def predict(model: TorqueModel | str | Path, recording: GivenRecording) -> Predi
     if len(model.arm) != len(recording.arm):
         raise InputError(f"the model has {len(model.arm)} joints, {recording.name} has {len(recording.arm)}")
     require_torque(recording)
-    errors = tuple(run_error(model, model.signals(run)) for run in recording.runs)
+    errors = tuple(run_error(model, model.signals(run), arm=recording.arm) for run in recording.runs)
     return Prediction(recording, errors, {run.name: model.predict(run) for run in recording.runs})
 
 

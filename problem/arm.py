@@ -116,7 +116,8 @@ class Arm:
     gravity: (3,), m/s2, in the base frame. rotor_inertia: one a joint, kg m2 (kg) on the joint side. joint_laws: what
     the file of a simulator says of each joint; empty where it says nothing. compensated: of each link the masses whose
     weight the simulator carries; empty where it carries none. coupled: joints of the chain that others lead, from the
-    base on; they are none of `joints`, and their links none of `links` (see `coupled_joints`).
+    base on; they are none of `joints`, and their links none of `links` (see `coupled_joints`). unmeasured: joints, from
+    0, whose torque nobody knows: the dynamics leave their rows zero.
     """
 
     name: str
@@ -127,6 +128,7 @@ class Arm:
     joint_laws: tuple[JointLaw, ...] = ()
     compensated: tuple[Link, ...] = ()
     coupled: tuple[CoupledJoint, ...] = ()
+    unmeasured: frozenset[int] = frozenset()
 
     def __repr__(self) -> str:
         """Joints, what is known of the links, and how many joints have limits."""
@@ -154,6 +156,11 @@ class Arm:
         return np.concatenate([link.parameters for link in self.links])
 
     @property
+    def measured(self) -> tuple[int, ...]:
+        """The joints, from 0, whose torque is known."""
+        return tuple(joint for joint in range(len(self)) if joint not in self.unmeasured)
+
+    @property
     def parameter_names(self) -> tuple[str, ...]:
         """Names like `mcx2`: the parameter of eq. 31 and the number of the link, from 1."""
         return tuple(f"{name}{link + 1}" for link in range(len(self)) for name in PARAMETER_NAMES)
@@ -168,6 +175,7 @@ class Arm:
             joint_laws=self.joint_laws[:joints],
             compensated=self.compensated[:joints],
             coupled=tuple(each for each in self.coupled if each.behind <= joints),
+            unmeasured=frozenset(each for each in self.unmeasured if each < joints),
         )
 
     @cached_property

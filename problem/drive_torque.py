@@ -11,7 +11,7 @@ from armlab.common.arrays import Array
 from problem.arm import Arm
 from problem.coupled_joints import chain_motion, torque_at_leaders
 from problem.motion import Motion
-from problem.regressor import coupled_links_torque, rigid_body_torque, torque_of_links
+from problem.regressor import coupled_links_torque, measured_rows, rigid_body_torque, torque_of_links
 
 
 def drive_torque(arm: Arm, motion: Motion, parameters: Array | None = None) -> Array:
@@ -25,7 +25,7 @@ def drive_torque(arm: Arm, motion: Motion, parameters: Array | None = None) -> A
     if arm.joint_laws:
         torque = torque + motion.velocity * np.array([law.damping for law in arm.joint_laws])
         torque = torque + np.sign(motion.velocity) * np.array([law.friction for law in arm.joint_laws])
-    return torque + position_torque(arm, motion)
+    return measured_rows(arm, torque + position_torque(arm, motion))
 
 
 def springs_torque(arm: Arm, motion: Motion) -> Array:
@@ -33,7 +33,7 @@ def springs_torque(arm: Arm, motion: Motion) -> Array:
     if not arm.joint_laws:
         return np.zeros(motion.position.shape)
     stiffness, rest = np.array([(law.stiffness, law.rest) for law in arm.joint_laws]).T
-    return np.asarray(stiffness * (motion.position - rest))
+    return measured_rows(arm, stiffness * (motion.position - rest))
 
 
 def compensation_torque(arm: Arm, motion: Motion) -> Array:
@@ -45,7 +45,7 @@ def compensation_torque(arm: Arm, motion: Motion) -> Array:
     by_drive = [law.drive_compensates for law in arm.chain.joint_laws]
     carried = np.concatenate([link.parameters for link in arm.chain.compensated])
     weight = torque_of_links(arm.chain, at_rest, carried)
-    return torque_at_leaders(arm, np.where(by_drive, 0.0, weight))
+    return measured_rows(arm, torque_at_leaders(arm, np.where(by_drive, 0.0, weight)))
 
 
 def torque_beside_columns(arm: Arm, motion: Motion) -> Array:

@@ -24,8 +24,8 @@ def observation_matrix(arm: Arm, motion: Motion) -> Array:
     """Rows that map the inertial parameters to joint torques, tau = W @ phi (eq. 39-41).
 
     motion: (..., samples, joints). Returns (..., samples * joints, 10 * joints), the joints of one sample in
-    consecutive rows, N m per parameter unit; parameters in the order of eq. 31, link by link.
-    Raises ValueError if the joint counts differ.
+    consecutive rows, N m per parameter unit; parameters in the order of eq. 31, link by link. The rows of joints that
+    are not measured are zero. Raises ValueError if the joint counts differ.
     """
     joints = _check_joint_count(arm, motion)
     if arm.coupled:
@@ -33,7 +33,22 @@ def observation_matrix(arm: Arm, motion: Motion) -> Array:
     out = np.zeros((*motion.batch, motion.samples * joints, 10 * joints))
     samples = motion.position.size // joints
     lib.observation_matrices(joints, *_kernel_data(arm), samples, *_motion_pointers(motion), pointer(out))
+    _leave_out(arm, out.reshape(*motion.position.shape, 10 * joints))
     return out
+
+
+def measured_rows(arm: Arm, torque: Array) -> Array:
+    """Torque (..., samples, joints) as it can be compared: zeros for joints that are not measured."""
+    if not arm.unmeasured:
+        return torque
+    out = torque.copy()
+    out[..., sorted(arm.unmeasured)] = 0.0
+    return out
+
+
+def _leave_out(arm: Arm, rows: Array) -> None:
+    """Zeros in the rows (..., samples, joints, columns) of joints that are not measured."""
+    rows[..., sorted(arm.unmeasured), :] = 0.0
 
 
 def _coupled_observation_matrix(arm: Arm, motion: Motion) -> Array:
@@ -43,6 +58,7 @@ def _coupled_observation_matrix(arm: Arm, motion: Motion) -> Array:
     whole = observation_matrix(arm.chain, chain_motion(arm, motion))
     by_joint = whole.reshape(*motion.batch, motion.samples, count, count, 10)[..., list(arm.chain_places), :]
     rows = np.einsum("...clp,cj->...jlp", by_joint, matrix)
+    _leave_out(arm, rows.reshape(*motion.position.shape, 10 * joints))
     return np.asarray(rows.reshape(*motion.batch, motion.samples * joints, 10 * joints))
 
 
@@ -154,7 +170,7 @@ def coupled_links_torque(arm: Arm, motion: Motion) -> Array:
     parameters = arm.chain.parameters.reshape(-1, 10)
     parameters[list(arm.chain_places)] = 0.0
     torque = torque_of_links(arm.chain, chain_motion(arm, motion), parameters.ravel())
-    return torque_at_leaders(arm, torque)
+    return measured_rows(arm, torque_at_leaders(arm, torque))
 
 
 def torque_of_links(arm: Arm, motion: Motion, parameters: Array) -> Array:
@@ -163,14 +179,15 @@ def torque_of_links(arm: Arm, motion: Motion, parameters: Array) -> Array:
     if arm.coupled:
         whole = np.zeros((len(arm.chain), 10))
         whole[list(arm.chain_places)] = np.asarray(parameters).reshape(joints, 10)
-        return torque_at_leaders(arm, torque_of_links(arm.chain, chain_motion(arm, motion), whole.ravel()))
+        torque = torque_of_links(arm.chain, chain_motion(arm, motion), whole.ravel())
+        return measured_rows(arm, torque_at_leaders(arm, torque))
     phi = np.ascontiguousarray(parameters, dtype=np.float64)
     if phi.shape != (10 * joints,):
         raise ValueError(f"{arm.name!r} takes {10 * joints} parameters, not an array of shape {phi.shape}")
     out = np.empty(motion.position.shape)
     samples = motion.position.size // joints
     lib.torques(joints, *_kernel_data(arm), samples, *_motion_pointers(motion), pointer(phi), pointer(out))
-    return out
+    return measured_rows(arm, out)
 
 
 def inertia_column(arm: Arm, position: Array, joint: int, parameters: Array | None = None) -> Array:

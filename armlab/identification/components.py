@@ -16,8 +16,8 @@ from problem.arm import Arm
 
 
 def every_joint(arm: Arm, law: type[Term], **details: Any) -> tuple[Candidate, ...]:
-    """A law at each joint. details: as `law.at` takes them, such as the shape of a power of velocity."""
-    return tuple(law.at(arm, joint, **details) for joint in range(1, len(arm) + 1))
+    """A law at each joint with torque. details: as `law.at` takes them, such as the shape of a power of velocity."""
+    return tuple(law.at(arm, joint + 1, **details) for joint in arm.measured)
 
 
 def wrist_couplings(arm: Arm) -> tuple[Candidate, ...]:
@@ -31,7 +31,8 @@ def usual_components(arm: Arm, top_speed: Array | None = None) -> tuple[Candidat
 
     top_speed: (joints,), rad/s (m/s); Coulomb friction turns smoothly then, by a share of it.
     """
-    springs = (LinearSpring.at(arm, joint) for joint, law in enumerate(arm.joint_laws, 1) if law.stiffness)
+    stiff = [joint for joint in arm.measured if arm.joint_laws and arm.joint_laws[joint].stiffness]
+    springs = (LinearSpring.at(arm, joint + 1) for joint in stiff)
     coulomb = every_joint(arm, CoulombFriction)
     if top_speed is not None:
         widths = COULOMB_WIDTH * np.where(top_speed > 0, top_speed, 1.0)

@@ -37,6 +37,7 @@ from armlab.identification.validation import (
     total_error_line,
 )
 from armlab.recordings.cutoff_trial import choose_cutoff_hz
+from armlab.recordings.dead_joints import NO_TORQUE
 from armlab.recordings.identifiable import require_identifiable, require_possible, require_torque
 from armlab.recordings.load import load_recording
 from armlab.recordings.plain_least_squares import PlainModel, fit_plain_rows, prepare_rows
@@ -206,8 +207,9 @@ def identify_recording(
     identifier, how = fit_identifier(recording, options, progress)
     model = identifier.model_
     plain = _plain_beside(recording, model)
-    errors = tuple(run_error(model, model.signals(run), plain) for run in recording.runs)
+    errors = tuple(run_error(model, model.signals(run), plain, recording.arm) for run in recording.runs)
     yield from how
+    yield from (each.text for each in recording.findings if each.kind == NO_TORQUE)
     yield from parameter_lines(model)
     yield from (f"{part.label}: no motion separates it from the links, left out" for part in identifier.absorbed_)
     yield f"condition number: {identifier.condition_number_:.4g} (columns at unit length)"
@@ -246,7 +248,7 @@ def wrong_reading(recording: Recording) -> Answer | None:
     answer = read_rightly(
         recording, recording.arm.parameters if recording.arm.links is not None else None, ReadingTuning()
     )
-    return answer if answer.findings else None
+    return answer if answer.mistakes else None
 
 
 def _refuse_wrong_reading(recording: Recording, out: Path) -> None:
@@ -296,7 +298,7 @@ def predict_recording(path: Path, folder: Path, out: Path | None) -> ResultLines
     if len(model.arm) != len(recording.arm):
         raise InputError(f"{path} is for {len(model.arm)} joints, {folder} has {len(recording.arm)}")
     require_torque(recording)
-    errors = tuple(run_error(model, model.signals(run)) for run in recording.runs)
+    errors = tuple(run_error(model, model.signals(run), arm=recording.arm) for run in recording.runs)
     yield error_table(errors)
     written: tuple[Path, ...] = ()
     if out is not None:

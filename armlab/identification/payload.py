@@ -27,6 +27,7 @@ from armlab.identification.priors import point_mass
 from armlab.identification.regression import Regression, regression, require_rows, signals_of, suggested_cutoff
 from armlab.identification.selection import counterbalance_groups
 from armlab.identification.structure import Structure
+from armlab.recordings.dead_joints import leave_out_together
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.identifiable import require_identifiable, require_possible
 from armlab.recordings.load import load_recording
@@ -243,6 +244,7 @@ class _PayloadTask:
         if len(bare.arm) != len(carrying.arm):
             raise InputError(f"{without} has {len(bare.arm)} joints, {loaded} has {len(carrying.arm)}")
         setting.check(carrying.arm)
+        carrying, bare = leave_out_together(carrying, bare)
         for each in (carrying, bare):
             require_identifiable(each)
             require_possible(each)

@@ -10,6 +10,8 @@ from armlab.common.report.wording import format_number
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.plain_least_squares import PlainModel
+from problem.arm import Arm
+from problem.regressor import measured_rows
 
 MIN_TORQUE = 1e-9  # N m (N), root mean square: less is a signal without power, whose share says nothing
 
@@ -44,17 +46,22 @@ class RunError:
     joints: tuple[JointError, ...]
 
 
-def run_error(model: TorqueModel, signals: Signals, plain: PlainModel | None = None) -> RunError:
-    """The errors of a model on a run, with those of plain least squares beside them where it is given."""
-    left = signals.torque - model.filtered_torque(signals)
+def run_error(
+    model: TorqueModel, signals: Signals, plain: PlainModel | None = None, arm: Arm | None = None
+) -> RunError:
+    """The errors of a model on a run, with those of plain least squares beside them where it is given.
+
+    arm: of the recording, that of the model if left out; joints that it does not measure have no error.
+    """
+    arm = model.arm if arm is None else arm
+    left = measured_rows(arm, signals.torque - model.filtered_torque(signals))
     plain_left = None if plain is None else signals.torque - signals.filter(plain.predict(signals.run))
     rows = signals.filter.rows
     recorded = signals.run.torque[rows]
-    raw = recorded - model.torque(signals.motion, signals.run)[rows]
-    each = range(len(model.arm))
-    joints = tuple(_joint_error(model, joint, left[:, joint], signals.torque[:, joint]) for joint in each)
+    raw = measured_rows(arm, recorded - model.torque(signals.motion, signals.run)[rows])
+    joints = tuple(_joint_error(model, joint, left[:, joint], signals.torque[:, joint]) for joint in arm.measured)
     if plain_left is not None:
-        shares = (relative_percent(plain_left[:, joint], signals.torque[:, joint]) for joint in each)
+        shares = (relative_percent(plain_left[:, joint], signals.torque[:, joint]) for joint in arm.measured)
         joints = tuple(replace(own, percent_plain=share) for own, share in zip(joints, shares, strict=True))
     return RunError(
         run=signals.run.name,

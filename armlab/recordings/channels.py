@@ -28,6 +28,8 @@ def make_raw_run(table: Table, file: RecordingFile, entry: RunEntry, units: dict
     signals, notes = _read_signals(table, file, entry, units)
     time = signals.pop("time")[:, 0]
     torque = signals.pop("torque" if file.columns.torque else "current")
+    if file.transmission.torque is None:  # else a channel belongs to several joints
+        torque[:, [joint - 1 for joint in file.without_torque]] = 0.0
     findings = (*table.findings, *notes, *report_assumed_units(file))
     run = Run(entry.file, entry.role, time, signals.pop("position"), torque, findings=findings)
     return run.with_signals(time, signals)

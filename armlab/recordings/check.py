@@ -11,6 +11,7 @@ from armlab.common.arrays import Array
 from armlab.common.documents import Document
 from armlab.common.errors import InputError
 from armlab.recordings.clock import MAX_BRIDGED_GAP
+from armlab.recordings.dead_joints import NO_TORQUE
 from armlab.recordings.identifiable import has_no_torque, reason_not_identifiable, reason_still
 from armlab.recordings.load import load_runs, open_recording, with_runs
 from armlab.recordings.motion import (
@@ -68,6 +69,7 @@ def signs_of_wrong_reading(recording: Recording) -> tuple[Finding, ...]:
         "standstill",
         "encoder_period",
         "unsigned_current",
+        NO_TORQUE,
     )
     first = {(each.kind, each.joint): each for each in reversed(found) if each.kind in kinds}
     return tuple(reversed(first.values()))
@@ -80,7 +82,8 @@ def _joint_warning(kind: str, joint: int, text: str) -> list[Finding]:
 def _find_dead_channels(run: MotionRun, arm: Arm, joint: int) -> list[Finding]:
     found, own = [], joint_in_words(arm, joint + 1)
     for name, signal in run.signals.items():
-        if name in ("torque", "velocity") and np.ptp(signal[:, joint]) == 0:
+        is_left_out = name == "torque" and joint in arm.unmeasured
+        if name in ("torque", "velocity") and np.ptp(signal[:, joint]) == 0 and not is_left_out:
             found += _joint_warning("dead_channel", joint, f"{name} of {own} is constant: a dead channel?")
     if np.ptp(run.position[:, joint]) == 0:
         found += _joint_warning("still_joint", joint, f"position of {own} is constant: locked, or dead?")
@@ -341,7 +344,7 @@ def _check_geometry(recording: Recording) -> tuple[Finding, ...]:
 def _check_reading(recording: Recording, inertial: Array | None, tuning: ReadingTuning) -> tuple[Finding, ...]:
     answer: Answer = read_rightly(recording, inertial, tuning)
     findings = [each.finding for each in answer.doubts]
-    for each in answer.findings:
+    for each in answer.mistakes:
         rivals = "".join(f"; or {rival.text}" for rival in each.rivals)
         worst = joint_in_words(recording.arm, each.worst_joint)
         text = f"{each.description}{rivals} (error of {worst} {each.share_before:.0%}, read so {each.share_after:.0%})"

@@ -89,7 +89,7 @@ def has_no_torque(runs: Sequence[Run]) -> bool:
 
 def reason_dead(runs: Sequence[Run], arm: Arm) -> str | None:
     """Torques that never change, and columns that are copies of others."""
-    dead = [joint for joint in range(len(arm)) if all(np.ptp(run.torque[:, joint]) == 0 for run in runs)]
+    dead = [joint for joint in arm.measured if all(np.ptp(run.torque[:, joint]) == 0 for run in runs)]
     if dead:
         zero = all(not np.any(run.torque[:, dead]) for run in runs)
         if zero and len(dead) == len(arm):
@@ -100,7 +100,7 @@ def reason_dead(runs: Sequence[Run], arm: Arm) -> str | None:
         said = "is zero throughout" if zero else "never changes"
         words = joints_in_words(arm, [joint + 1 for joint in dead])
         return f"The torque of {words} {said}: is the right column named?"
-    for first, second in combinations(range(len(arm)), 2):
+    for first, second in combinations(arm.measured, 2):
         words = joints_in_words(arm, [first + 1, second + 1])
         for name in ("torque", "position"):
             if all(_is_copy(run.signals[name][:, first], run.signals[name][:, second]) for run in runs):

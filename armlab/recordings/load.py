@@ -18,6 +18,7 @@ from armlab.recordings.channels import (
     to_joint_side,
 )
 from armlab.recordings.clock import cut_at_jumps, cut_into_clocks, keep_long_parts, part_equal_stamps, require_samples
+from armlab.recordings.dead_joints import leave_dead_joints_out
 from armlab.recordings.encoders import read_direction_bit, unwrap_encoders
 from armlab.recordings.reading.signs import compare_joint_names
 from armlab.recordings.recording import AnyRun, Finding, Recording, Run, Transmission
@@ -63,6 +64,7 @@ def open_recording(folder: Path) -> tuple[Recording, RecordingFile]:
     arm = load_arm(file.robot, folder)
     if file.gravity is not None:
         arm = replace(arm, gravity=file.gravity)
+    arm = replace(arm, unmeasured=_stated_without_torque(file, arm, folder))
     if file.restore_gravity and arm.links is None:
         raise InputError(f"restore_gravity in {folder / FILE_NAME}: the robot states no links whose gravity is known")
     transmission = make_transmission(file, arm, folder)
@@ -72,6 +74,17 @@ def open_recording(folder: Path) -> tuple[Recording, RecordingFile]:
     names = _compare_names(file, arm)
     empty = Recording(folder, file.robot, arm, (), transmission, simulation, file.sample_rate_hz, names)
     return replace(empty, recorded=file.recorded), file
+
+
+def _stated_without_torque(file: RecordingFile, arm: Arm, folder: Path) -> frozenset[int]:
+    """The joints, from 0, of which the file says that they have no torque."""
+    stated, where = file.without_torque, f"without_torque in {folder / FILE_NAME}"
+    beyond = [each for each in stated if each > len(arm)]
+    if beyond:
+        raise InputError(f"{where} names joint {beyond[0]}, but the robot has {len(arm)} joints")
+    if len(set(stated)) == len(arm):
+        raise InputError(f"{where} names all joints: a joint with torque is needed")
+    return frozenset(each - 1 for each in stated)
 
 
 def _compare_names(file: RecordingFile, arm: Arm) -> tuple[Finding, ...]:
@@ -131,7 +144,8 @@ def repair_run(raw: AnyRun, places: RepairPlaces) -> tuple[AnyRun, ...]:
 
 
 def with_runs(recording: Recording, runs: Sequence[Run]) -> Recording:
-    """The recording with its runs; notes where they differ in rate, or where none validates."""
+    """The recording with its runs, dead joints left out; notes where runs differ in rate, or where none validates."""
+    recording = leave_dead_joints_out(replace(recording, runs=tuple(runs)))
     findings = list(recording.findings)
     rates = {run.name: run.rate_hz for run in runs}
     if rates and max(rates.values()) > 1.02 * min(rates.values()):
@@ -141,4 +155,4 @@ def with_runs(recording: Recording, runs: Sequence[Run]) -> Recording:
     if not any(run.role == "validate" for run in runs):
         text = "no run has the role validate: a diagnosis holds out blocks of time of the runs that identify"
         findings.append(Finding("no_validation", "note", text))
-    return replace(recording, runs=tuple(runs), findings=tuple(findings))
+    return replace(recording, findings=tuple(findings))

@@ -323,13 +323,14 @@ class PlainLayout:
 
     def _all(self, motion: Motion, coulomb_width: Array) -> Array:
         """Columns of all links, then JOINT_COLUMNS. coulomb_width: (joints,), rad/s (m/s)."""
-        chosen, joints = list(self.joints), len(self.joints)
+        chosen = list(self.joints)
         whole = np.zeros((3, motion.samples, len(self.arm)))
         whole[:, :, chosen] = motion.position, motion.velocity, motion.acceleration
         links = observation_matrix(self.arm, Motion(*whole)).reshape(motion.samples, len(self.arm), -1)[:, chosen]
         speed = motion.velocity
         laws = (motion.acceleration, np.tanh(speed / coulomb_width), speed, np.ones(speed.shape))
-        return np.concatenate([links, *(law[:, :, None] * np.eye(joints) for law in laws)], axis=2)
+        own = np.diag([float(joint not in self.arm.unmeasured) for joint in chosen])
+        return np.concatenate([links, *(law[:, :, None] * own for law in laws)], axis=2)
 
 
 def runs_of_motion(recording: MotionRecording) -> tuple[Run, ...]:

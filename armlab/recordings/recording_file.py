@@ -159,8 +159,8 @@ class RecordingFile(Settings):
     controller: of the simulation; null where it is unknown. recorded: the day, as 2026-01-31. timing: errors of the
     clock that are taken back. gravity: m/s2 in the base frame, where the arm is mounted otherwise than its robot file
     says. restore_gravity: whether the gravity of the robot's links, which the drive took from the torque, is added.
-    joints: of a recording of motion only, names of the joints that the columns belong to; all if left out.
-    The others are held at zero.
+    without_torque: joints, from 1, whose columns of torque hold none: they are left out. joints: of a recording of
+    motion only, names of the joints that the columns belong to; all if left out. The others are held at zero.
     """
 
     schema_: Literal["recording/1"] = Field(alias="schema")
@@ -177,6 +177,7 @@ class RecordingFile(Settings):
     timing: TimingEntry | None = None
     gravity: tuple[float, float, float] | None = None
     restore_gravity: bool = False
+    without_torque: tuple[Annotated[int, Ge(1)], ...] = ()
     runs: Annotated[tuple[RunEntry, ...], Len(min_length=1)]
 
     @property

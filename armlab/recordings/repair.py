@@ -71,7 +71,10 @@ def _cause_of_bad_rows(wrong: dict[str, NDArray[np.bool_]], names: dict[str, tup
         empty = np.flatnonzero(flags.all(axis=0))
         if len(empty):
             column = names[name][int(empty[0])]
-            return f"column {column} ({name}) holds no number in any row: name another column, or import the log"
+            instead = "name another column, import the log" + (
+                ", or state the joint in `without_torque`" * (name == "torque")
+            )
+            return f"column {column} ({name}) holds no number in any row: {instead}"
     missing = {name: flags.all(axis=1) for name, flags in wrong.items()}
     for name, alone in missing.items():
         others = [flags for other, flags in missing.items() if other not in (name, "time")]

@@ -41,7 +41,7 @@ def constant() -> pd.DataFrame:
 
 def copied() -> pd.DataFrame:
     table = frame()
-    return table.assign(tau3=table["tau2"])
+    return table.assign(tau2=table["tau1"], tau3=table["tau1"])
 
 
 def multiple() -> pd.DataFrame:
@@ -72,9 +72,8 @@ def strong() -> pd.DataFrame:
 
 CASES = {
     silent: "is zero throughout: the driver does not fill it",
-    one_silent: "The torque of joint 2 is zero throughout: is the right column named?",
     constant: "never changes: is the right column named?",
-    copied: "The torque of joints 2 and 3 is the same in every row",
+    copied: "The torque of joints 1 and 2 is the same in every row",
     multiple: "The torque of joints 2 and 3 differs by the factor -0.4 in every row",
     still: "No joint moves",
     short: "The runs hold 0.29 s in all: too short to tell physics from chance; record 10 s or more.",
@@ -125,7 +124,7 @@ def test_every_command_refuses_what_tells_nothing_in_one_line(made: Callable[[],
 
 def test_a_prediction_asks_for_torque_and_not_for_motion_or_length(tmp_path: Path) -> None:
     model = identified(tmp_path)
-    for made in (silent, one_silent, constant, copied):
+    for made in (silent, constant, copied):
         bad = folder_with(tmp_path / made.__name__, made(), ALONE)
         assert CASES[made] in refusal(run_through, predict_recording(model, bad, None))
     for made in (still, short):
@@ -207,7 +206,7 @@ def test_a_run_that_validates_is_asked_for_impossible_numbers_too(tmp_path: Path
 
 
 def test_an_import_says_what_cannot_be_identified_from_what_it_writes(tmp_path: Path) -> None:
-    said = {short: CASES[short], still: CASES[still], one_silent: CASES[one_silent], copied: CASES[copied]}
+    said = {short: CASES[short], still: CASES[still], copied: CASES[copied]}
     for made, sentence in said.items():
         made().to_csv(tmp_path / "log.csv", index=False)
         options = {**IMPORT_OPTIONS, "units": ("position=rad", "torque=N.m")}

@@ -103,7 +103,9 @@ def compare(
     for other in (new, *more):
         _check_same_robot(old, other)
     known_dates = recording_dates((old, new, *more), dates)
-    recordings = (old, *(replace(each, arm=old.arm, simulation=old.simulation) for each in (new, *more)))
+    without_torque = frozenset.intersection(*(each.arm.unmeasured for each in (old, new, *more)))
+    arm = replace(old.arm, unmeasured=without_torque)  # a joint that some recordings have torque of tells a change
+    recordings = tuple(replace(each, arm=arm, simulation=old.simulation) for each in (old, new, *more))
     own = baseline or model_baseline(old)
 
     def diagnose_all() -> list[Diagnosis]:

@@ -132,7 +132,7 @@ def _orthonormal_basis(columns: Array) -> Array:
     lengths = np.linalg.norm(columns, axis=0)
     scaled = columns[:, lengths > 0] / lengths[lengths > 0]
     power, axes = np.linalg.eigh(scaled.T @ scaled)
-    kept = power > INDEPENDENT_POWER * power[-1]
+    kept = power > INDEPENDENT_POWER * power.max(initial=0.0)
     return np.asarray(scaled @ (axes[:, kept] / np.sqrt(power[kept])))
 
 

@@ -140,7 +140,7 @@ def nominal_payload_lines(loaded: Path, setting: PayloadSetting, progress: Progr
     require_identifiable(recording)
     settings = _settings_of(setting)
     setup = find_setup(recording, None, settings, progress)
-    if setup is not None and setup.findings:
+    if setup is not None and setup.mistakes:
         yield setup.sentence
     found = find_load(setup.recording if setup else recording, setting, settings, progress)
     yield from (number_line(each) for each in found.numbers)

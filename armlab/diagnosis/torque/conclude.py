@@ -171,7 +171,7 @@ def _assemble(
     parts = explain_error(prediction.model, observed, claims, (start, final), floor)
     claims = without_lesser_unknowns(claims, parts)
     parts = explain_error(prediction.model, observed, claims, (start, final), floor)
-    errors = [each.after for each in fits]
+    errors = {each.joint - 1: each.after for each in fits}
     parts = tuple(replace(each, removal=as_found(each.removal, errors, observed)) for each in parts)
     claims = tuple(replace(each, removal=as_found(each.removal, errors, observed)) for each in claims)
     claims = with_minor_ones(claims, parts)

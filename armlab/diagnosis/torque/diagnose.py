@@ -23,8 +23,9 @@ from armlab.diagnosis.torque.search.fitted_model import (
 )
 from armlab.diagnosis.torque.stages import BY_PROBABILITY, BY_TESTS, find_names, run_stages
 from armlab.recordings.check import signs_of_wrong_reading
+from armlab.recordings.dead_joints import leave_dead_joints_out
 from armlab.recordings.identifiable import reason_impossible, reason_not_identifiable
-from armlab.recordings.reading.answer import Answer, read_rightly
+from armlab.recordings.reading.answer import Answer, read_rightly, with_joints_left_out
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording
 from problem.base_parameters import base_parameters
@@ -48,7 +49,7 @@ def diagnose(
     but the reading is asked. repetitions: how often it is asked whether names survive (`with_survival`). Raises
     InputError where the wanted baseline is not there.
     """
-    started, settings = time.perf_counter(), settings or Settings()
+    started, settings, recording = time.perf_counter(), settings or Settings(), leave_dead_joints_out(recording)
     signs = signs_of_wrong_reading(recording)
     setup = None if as_read else find_setup(recording, baseline, settings, progress)
     read_after = time.perf_counter() - started
@@ -77,7 +78,8 @@ def _only_if_explained(found: Diagnosis, setup: Answer | None, tuning: ReadingTu
     if observed is None or found.simulation.kind == "simulated":
         return found
     held_out = np.concatenate([observed.torque[each.start : each.stop] for each in observed.of_role("validate")])
-    left = np.array([each.after for each in found.fit]) / np.maximum(np.std(held_out, axis=0), SMALLEST_TORQUE)
+    spread = np.maximum(np.std(held_out, axis=0), SMALLEST_TORQUE)
+    left = [each.after / spread[each.joint - 1] for each in found.fit]
     share = float(np.exp(np.mean(np.log(np.maximum(left, SMALLEST_SHARE)))))
     if share <= tuning.max_unexplained:
         return found
@@ -121,7 +123,8 @@ def find_setup(
     """
     simulation = read_simulation(recording, baseline)
     if simulation.kind == "simulated" or reason_not_identifiable(recording) is not None:
-        return None
+        left_out = with_joints_left_out(Answer((), recording, None), recording)
+        return left_out if left_out.findings else None
     progress("reading the recording rightly")
     return read_rightly(recording, simulation.inertial, settings.tuning.reading)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from armlab.common.documents import Document
 from armlab.common.errors import InputError
+from armlab.recordings.dead_joints import NO_TORQUE
 from armlab.recordings.identifiable import has_no_torque, reason_dead, reason_not_identifiable
 from armlab.recordings.imports.families import describe_unused, list_columns
 from armlab.recordings.imports.gears import Gear
@@ -142,7 +143,7 @@ def _repairs_of(runs: Sequence[MotionRun]) -> tuple[tuple[str, str], ...]:
 
 
 def _read_written(folder: Path, half_step_s: float | None) -> tuple[tuple[tuple[str, str], ...], tuple[str, ...]]:
-    """What reading repairs, and why nothing can be identified from what was written, if that is so.
+    """What reading repairs; joints that are left out, and why nothing can be identified from what was written.
 
     half_step_s: by which signals may be apart in time, where the torques have to tell.
     Raises InputError for what no command could use, a torque that no joint has among it.
@@ -156,7 +157,8 @@ def _read_written(folder: Path, half_step_s: float | None) -> tuple[tuple[tuple[
     if half_step_s is not None:
         require_times(runs, recording.arm, half_step_s)
     reason = reason_not_identifiable(recording) if recording.with_role("identify") else None
-    return _repairs_of(recording.runs), () if reason is None else (reason,)
+    left_out = tuple(each.text for each in recording.findings if each.kind == NO_TORQUE)
+    return _repairs_of(recording.runs), left_out if reason is None else (*left_out, reason)
 
 
 def _remove_written(folder: Path, was_there: bool) -> None:

@@ -1,10 +1,11 @@
 """How a recording is to be read: the mistakes with their evidence, their rivals, and the recording as it should be."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.recordings.dead_joints import NO_TORQUE
 from armlab.recordings.reading.corrected import correct_recording
 from armlab.recordings.reading.judge import ReadingJudge
 from armlab.recordings.reading.reading import SPRING, Mistake, Reading, read_as_is
@@ -63,7 +64,7 @@ class SetupFinding:
     @property
     def text(self) -> str:
         """What is wrong, and the evidence."""
-        if self.mistake.effect == UNSIGNED:
+        if self.mistake.effect in (UNSIGNED, NO_TORQUE):
             return self.description
         worst = joint_in_words(self.arm, self.worst_joint)
         return (
@@ -92,7 +93,8 @@ class Doubt:
 class Answer:
     """How a recording is to be read.
 
-    findings: in the order in which they were found, none where it is read rightly. recording: as it should be read.
+    findings: joints without torque, which are left out, then what is read wrongly, in the order in which it was found;
+    none where it is read rightly. recording: as it should be read.
     share: held-out error of all joints as it is read, of the torque's scatter. share_after: of the recording as it
     should be read. undecided: joints whose zero the data do not tell by quarters of a turn, where a zero is a finding.
     doubts: what is not named and not excluded. looks: how many readings were compared, 0 where it is too short.
@@ -113,11 +115,21 @@ class Answer:
         return any(each.mistake.effect == UNSIGNED for each in self.findings)
 
     @property
+    def mistakes(self) -> tuple[SetupFinding, ...]:
+        """What is read wrongly: the findings but joints that are left out."""
+        return tuple(each for each in self.findings if each.mistake.effect != NO_TORQUE)
+
+    @property
     def sentence(self) -> str:
-        """The findings in a sentence; empty where there is none."""
-        if not self.findings:
+        """The findings in words; empty where there is none."""
+        left_out = [each.description for each in self.findings if each.mistake.effect == NO_TORQUE]
+        absent = f"Left out: {'; '.join(left_out)}." if left_out else ""
+        return " ".join(each for each in (absent, self._wrong_in_words()) if each)
+
+    def _wrong_in_words(self) -> str:
+        if not self.mistakes:
             return ""
-        mistakes = "; ".join(each.description for each in self.findings)
+        mistakes = "; ".join(each.description for each in self.mistakes)
         if self.is_lost:
             return f"The recording is read wrongly: {mistakes}. Links and friction cannot be told from it."
         zeros = joints_in_words(self.recording.arm, self.undecided) if self.undecided else ""
@@ -133,6 +145,26 @@ def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTu
 
     inertial: (10 * joints,) of the links of the simulation, None without one. Base parameters alone are no links.
     """
+    return with_joints_left_out(_find_answer(recording, inertial, tuning), recording)
+
+
+def with_joints_left_out(answer: Answer, recording: Recording) -> Answer:
+    """The answer, and which joints have no torque in the recording as it is."""
+    dead = [each for each in recording.findings if each.kind == NO_TORQUE]
+    if not dead:
+        return answer
+    found = tuple(_left_out(each, recording.arm) for each in dead)
+    reading = answer.reading or read_as_is(recording, None)
+    return replace(answer, findings=(*found, *answer.findings), reading=reading)
+
+
+def _left_out(finding: Finding, arm: Arm) -> SetupFinding:
+    joint = finding.joint or 1
+    mistake = Mistake(NO_TORQUE, joint)
+    return SetupFinding(mistake, arm, joint, 0.0, 0.0, 0.0, 0.0, np.inf, 1.0, (), measurement(NO_TORQUE, joint, arm))
+
+
+def _find_answer(recording: Recording, inertial: Array | None, tuning: ReadingTuning) -> Answer:
     if has_no_sign(recording):
         return Answer((_unsigned(recording),), recording, None)
     inertial = inertial if inertial is not None and are_bodies(inertial) else None

@@ -99,6 +99,8 @@ def _recording_settings(
         settings["gravity"] = list(reading.arm.gravity)
     if reading.adds_gravity:
         settings["restore_gravity"] = True
+    if reading.arm.unmeasured:
+        settings["without_torque"] = [joint + 1 for joint in sorted(reading.arm.unmeasured)]
     for run in settings["runs"]:
         run["file"] = beside(run["file"])
     if file.simulation is not None:

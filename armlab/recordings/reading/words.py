@@ -14,6 +14,7 @@ NAMES = {
     "channel_order": "columns in another order",
     "axis_coupling": "a column that counts two joints",
     "unsigned_current": "a current without its sign",
+    "no_torque": "a column without torque",
     "unit_error": "another unit",
     "gear_ratio": "recorded on the other side of a gear",
     "encoder_offset": "a wrong zero",
@@ -38,6 +39,7 @@ MEASUREMENTS = {
     "channel_order": "move one joint alone: the column that changes is its own",
     "axis_coupling": "move one joint alone: the columns that change are those that count it",
     "unsigned_current": "log the current with its sign, or its direction bit",
+    "no_torque": "log the torque or the current of the drive of {joint}",
     "unit_error": "turn a joint by a known angle, or hold a known load, and compare with the numbers of the file",
     "gear_ratio": "turn {joint} by a known angle and compare with its position",
     "encoder_offset": "drive {joint} to the zero of the drawing and read its position",
@@ -75,6 +77,8 @@ def describe(mistake: Mistake, arm: Arm) -> str:
     }
     if mistake.effect in texts:
         return texts[mistake.effect]
+    if mistake.effect == "no_torque":
+        return f"{place} has no torque"
     if mistake.effect == "unsigned_current":
         return "the recorded current has no sign: it is a magnitude"
     if mistake.effect == "axis_coupling":

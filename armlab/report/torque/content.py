@@ -156,7 +156,8 @@ def setup_part(diagnosis: Diagnosis) -> SetupPart | None:
             f"{each.share_before:.0%} → {each.share_after:.0%} of its torque"
         )
         rivals = "; ".join(rival.text for rival in each.rivals)
-        rows.append([each.description, error, rivals or "–", each.next_experiment or "–"])
+        shown = error if each.rms_before else "–"
+        rows.append([each.description, shown, rivals or "–", each.next_experiment or "–"])
     headings = ["read wrongly", "held-out error as it is → read rightly", "fits as well", "to tell"]
     text = (
         f"{setup.looks} readings of the recording and of the robot file were compared on blocks of time that were held "
@@ -172,7 +173,8 @@ def fit_table(diagnosis: Diagnosis, data: ShownResiduals) -> Table:
     first = ["as given"] if given is not None else []
     headings = ["joint", *first, "refitted", "plain least squares", "found", "noise floor", "gap closed"]
     rows = []
-    for joint, each in enumerate(diagnosis.fit):
+    for each in diagnosis.fit:
+        joint = each.joint - 1
         size = joint_unit(diagnosis.simulation.arm, joint)
         first = [] if given is None else [f"{format_number(float(given[joint]))} {size}"]
         values = (each.before, each.plain, each.after, each.noise_floor)
@@ -190,7 +192,8 @@ def fit_table(diagnosis: Diagnosis, data: ShownResiduals) -> Table:
 
 def whiteness_text(diagnosis: Diagnosis, data: ShownResiduals) -> str:
     """Whether what is left changes as fast as noise does: a floor that remembers itself holds structure too."""
-    joints = [joint for joint in range(len(diagnosis.fit)) if not is_white(data.final[:, joint], joint, data.observed)]
+    fitted = [each.joint - 1 for each in diagnosis.fit]
+    joints = [joint for joint in fitted if not is_white(data.final[:, joint], joint, data.observed)]
     times = [1e3 * correlation_seconds(data.final[:, joint], joint, data.observed) for joint in joints]
     arm = diagnosis.simulation.arm
     tied = [f"{joint_in_words(arm, joint + 1)} ({each:.0f} ms)" for joint, each in zip(joints, times, strict=True)]

@@ -51,26 +51,27 @@ Series = list[tuple[Look, Array]]
 
 def draw_errors_by_joint(diagnosis: Diagnosis, data: ShownResiduals) -> Markup:
     """Held-out error of each joint on a logarithmic axis: as given, refitted, with what was found, noise floor."""
-    series: Series = [(REFITTED_LOOK, data.held_out_rms(data.refit)), (FOUND_LOOK, data.held_out_rms(data.final))]
+    residuals = [(REFITTED_LOOK, data.refit), (FOUND_LOOK, data.final)]
     if data.given is not None:
-        series.insert(0, (GIVEN_LOOK, data.held_out_rms(data.given)))
-    arm = diagnosis.simulation.arm
+        residuals.insert(0, (GIVEN_LOOK, data.given))
+    arm, joints = diagnosis.simulation.arm, [each.joint - 1 for each in diagnosis.fit]
+    series: Series = [(look, data.held_out_rms(residual)[joints]) for look, residual in residuals]
     floors = np.array([each.noise_floor for each in diagnosis.fit])
-    kinds = {joint_unit(arm, joint) for joint in range(len(floors))}
+    kinds = {joint_unit(arm, joint) for joint in joints}
     axis = fit_axis(f"rms error, {' or '.join(sorted(kinds))}", *(each for _, each in series), floors, log=True)
-    names = [shorten_name(joint_in_words(arm, joint + 1)) for joint in range(len(floors))]
+    names = [shorten_name(joint_in_words(arm, joint + 1)) for joint in joints]
     left = float(np.clip(max(map(text_width, names)) + 12, LEFT_MARGIN, MAX_NAMES_WIDTH))
     top = 62.0
     height = top + JOINT_ROW_HEIGHT * len(floors) + 42
     content = svg_text("Error on held-out data", 6, 14, 12, font_weight="600") + _draw_marks_legend(series)
     content += _draw_grid(axis, left, top, height)
-    for joint, name in enumerate(names):
-        y = top + JOINT_ROW_HEIGHT * (joint + 0.5)
+    for row, name in enumerate(names):
+        y = top + JOINT_ROW_HEIGHT * (row + 0.5)
         content += svg_text(shorten_text(name, left - 12), 6, y + 4, 11)
-        content += _draw_joint_row(axis, left, y, [(look, float(each[joint])) for look, each in series], floors[joint])
+        content += _draw_joint_row(axis, left, y, [(look, float(each[row])) for look, each in series], floors[row])
     values = "; ".join(
-        f"{name}: {', '.join(f'{look.name} {format_number(float(each[joint]))}' for look, each in series)}"
-        for joint, name in enumerate(names)
+        f"{name}: {', '.join(f'{look.name} {format_number(float(each[row]))}' for look, each in series)}"
+        for row, name in enumerate(names)
     )
     return svg_picture(content, CHART_WIDTH, height, f"Held-out error by joint, logarithmic. {values}")
 
@@ -150,7 +151,8 @@ def draw_errors(diagnosis: Diagnosis, data: ShownResiduals) -> list[Markup]:
     if data.given is not None:
         models.insert(0, (GIVEN_LOOK, data.given))
     out = []
-    for joint, fit in enumerate(diagnosis.fit):
+    for fit in diagnosis.fit:
+        joint = fit.joint - 1
         size = joint_unit(diagnosis.simulation.arm, joint)
         lines: list[Layer] = [Line(time, left[rows, joint], look) for look, left in models]
         lines += [Level(sign * fit.noise_floor, FLOOR_LOOK) for sign in (1, -1)]
@@ -264,7 +266,7 @@ def _draw_error_against(
     for look, residual in ((start, data.before), (FOUND_LOOK, data.final)):
         across, power, _ = bin_means(x[used], residual[used, joint] ** 2, LOCATED_BINS)
         layers.append(Line(across, np.sqrt(power), look))
-    floor = diagnosis.fit[joint].noise_floor
+    floor = next(each.noise_floor for each in diagnosis.fit if each.joint == joint + 1)
     size = joint_unit(diagnosis.simulation.arm, joint)
     y = fit_axis(f"rms error, {size}", *(layer.y for layer in layers), np.array([floor]), zero=True)
     title = f"{shorten_name(joint_at_start(diagnosis.simulation.arm, joint + 1))}: error by {quantity}"

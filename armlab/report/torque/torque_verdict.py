@@ -124,7 +124,8 @@ def _joint_lines(diagnosis: Diagnosis, account: Account) -> Iterator[str]:
         own = [each for each in account.findings if each.claim.joint == joint]
         name = shorten_name(joint_in_table(arm, joint))
         left = next((f"{100 * each.share_of_torque:.0f} %" for each in account.left if each.joint == joint), NOTHING)
-        rows.append([name, friction_cell(account, joint, arm), left, _found_in_words(own, diagnosis.simulation)])
+        found = "no torque" if joint - 1 in arm.unmeasured else _found_in_words(own, diagnosis.simulation)
+        rows.append([name, friction_cell(account, joint, arm), left, found])
     whole = [each for each in account.findings if each.claim.joint is None]
     if whole:
         rows.append(["robot", NOTHING, NOTHING, _found_in_words(whole, diagnosis.simulation)])
@@ -206,7 +207,8 @@ def _setup_lines(number: int, finding: SetupFinding, arm: Arm) -> Iterator[str]:
     yield from (f"     {line}" for line in lines[1:])
     unit = joint_unit(arm, finding.worst_joint - 1)
     error = f"{format_number(finding.rms_before)} to {format_number(finding.rms_after)} {unit}"
-    yield f"     held-out error of {joint_in_words(arm, finding.worst_joint)}: {error}"
+    if finding.rms_before:
+        yield f"     held-out error of {joint_in_words(arm, finding.worst_joint)}: {error}"
     for rival in finding.rivals:
         yield from (f"     {line}" for line in wrap(f"fits as well: {rival.text}", LINE_WIDTH - 5))
     if finding.next_experiment:

@@ -94,6 +94,10 @@ def filtered_columns(candidate: Candidate, scenes: Sequence[Scene], observed: Ob
     parts = []
     for scene, signals in zip(scenes, observed.signals, strict=True):
         columns = candidate.columns(scene)
+        blind = [number for number, joint in enumerate(candidate.rows) if joint in scene.arm.unmeasured]
+        if blind:
+            columns = columns.copy()
+            columns[:, blind] = 0.0
         parts.append(signals.filter(columns) if same_filter else columns[signals.filter.rows])
     return np.concatenate(parts)
 

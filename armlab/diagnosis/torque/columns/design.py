@@ -144,7 +144,9 @@ def build_design_matrix(
     scenes = tuple(_scene_of_run(signals, signals.motion, simulation, inertial) for signals in observed.signals)
     pairs = zip(observed.signals, observed.calm, strict=True)
     calm = tuple(_scene_of_run(signals, motion, simulation, inertial) for signals, motion in pairs)
-    return DesignMatrix(settings, observed, simulation, base, prior, rigid, observed.torque - simulated, scenes, calm)
+    target = observed.torque - simulated
+    target[:, sorted(arm.unmeasured)] = 0.0
+    return DesignMatrix(settings, observed, simulation, base, prior, rigid, target, scenes, calm)
 
 
 def _scene_of_run(signals: Signals, motion: Motion, simulation: Simulation, inertial: Array) -> Scene:

@@ -42,6 +42,8 @@ def joint_fits(
     recorded = [recorded_residual(each, observed) for each in (rigid, *every)]
     out = []
     for joint, noise in enumerate(floor.tolist()):
+        if joint in found.arm.unmeasured:
+            continue
         rows = rows_in(observed.of_role("validate", joint), observed.rows)
         smooth, raw = (
             HeldOutErrors(*(float(np.sqrt(np.mean(each[rows, joint] ** 2))) for each in residuals))

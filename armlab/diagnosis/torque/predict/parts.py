@@ -246,8 +246,11 @@ def explain_error(
     return tuple(_with_share(each, share / total) for each, share in zip(parts, shares, strict=True))
 
 
-def as_found(removal: Removal | None, errors: Sequence[float], observed: Observed) -> Removal | None:
-    """A removal with the errors (joints,), N m (N), of the model found on these rows, in the place of the fit's own."""
+def as_found(removal: Removal | None, errors: Mapping[int, float], observed: Observed) -> Removal | None:
+    """A removal with the error, N m (N), of the model found on these rows, in the place of the fit's own.
+
+    errors: by joint, from 0.
+    """
     if removal is None:
         return None
     _, units = _rows_and_units(observed)
