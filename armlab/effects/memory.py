@@ -1,5 +1,6 @@
 """Friction with a memory: hysteresis after a reversal (Dahl 1968, LuGre 1995), and drift as the joint warms."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
@@ -380,7 +381,7 @@ DRIFT_FORMS = (ViscousDrift, CoulombDrift, HeatedFriction, ThermometerFriction)
 
 @dataclass(frozen=True)
 class DriftFamily(TermFamily):
-    """Drift by time and heat at each joint, runs cold or in turn as stamped; by temperature where recorded."""
+    """Drift by time and heat at each joint, runs cold or following one another; by temperature where recorded."""
 
     facts: Effect = FRICTION_DRIFT_FACTS
     terms: tuple[type[Term], ...] = DRIFT_FORMS
@@ -401,14 +402,26 @@ class DriftFamily(TermFamily):
 
 
 def _run_starts(scenes: Sequence[Scene]) -> tuple[tuple[str, float], ...]:
-    """Seconds before each run, and before one that comes after them; empty where no stamps say which came first."""
-    in_turn = sorted(scenes, key=lambda scene: scene.start)
-    ends = [scene.start + float(scene.time[-1]) for scene in in_turn]
-    if len(in_turn) == 1 or any(after.start <= end for after, end in zip(in_turn[1:], ends, strict=False)):
+    """Seconds before each run, and before one that comes after them; empty for a single run.
+
+    As they are stamped; where stamps overlap, one after the other in the order of their names.
+    """
+    if len(scenes) == 1:
         return ()
-    starts = [scene.start for scene in in_turn] + [ends[-1] + in_turn[-1].step]
-    names = [scene.run for scene in in_turn] + [""]
+    in_turn = sorted(scenes, key=lambda scene: scene.start)
+    starts = [scene.start for scene in in_turn]
+    lengths = [float(scene.time[-1] + scene.step) for scene in in_turn]
+    if any(after < start + length for start, length, after in zip(starts, lengths, starts[1:], strict=False)):
+        in_turn = sorted(scenes, key=lambda scene: _by_number(scene.run))
+        lengths = [float(scene.time[-1] + scene.step) for scene in in_turn]
+        starts = np.cumsum([0.0, *lengths[:-1]]).tolist()
+    names, starts = [*(scene.run for scene in in_turn), ""], [*starts, starts[-1] + lengths[-1]]
     return tuple((name, start - starts[0]) for name, start in zip(names, starts, strict=True))
+
+
+def _by_number(name: str) -> list[tuple[int, str]]:
+    """A key that sorts `run-2` before `run-10`."""
+    return [(int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", name)]
 
 
 def _thermometer_candidates(arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[list[Candidate]]:

@@ -203,8 +203,13 @@ def test_drift_goes_on_in_the_run_that_is_stamped_later() -> None:
     assert drift.warmth(replace(later, run="unheard-of.csv"))[0] == pytest.approx(1 - np.exp(-1.8), abs=1e-3)
 
 
-def test_runs_that_are_stamped_at_the_same_time_are_taken_as_cold() -> None:
-    assert clocks_of_drift(0.0, 0.0) == clocks_of_drift(0.0, 7.9) == clocks_of_drift(0.0) == {()}
+def test_runs_whose_stamps_overlap_follow_one_another_in_the_order_of_their_names() -> None:
+    assert max(clocks_of_drift(0.0, 0.0)) == (("run-0.csv", 0.0), ("run-1.csv", 8.0), ("", 16.0))
+    assert clocks_of_drift(0.0, 0.0) == clocks_of_drift(3.0, 0.0)
+    assert clocks_of_drift(0.0) == {()}
+    scenes = [scene(seed=seed, run=f"run-{seed}.csv") for seed in (10, 2)]
+    (clock,) = {place[0].began for place in family("friction_drift").candidates(scenes[0].arm, scenes)} - {()}
+    assert [name for name, _ in clock] == ["run-2.csv", "run-10.csv", ""]
 
 
 def test_heat_is_the_lagged_power_of_friction() -> None:
