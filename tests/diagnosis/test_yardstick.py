@@ -17,7 +17,11 @@ from armlab.diagnosis.torque.predict.yardstick import (
 )
 from armlab.diagnosis.torque.rows.data import in_fixed_order, observe
 from armlab.diagnosis.torque.rows.simulation import read_simulation
-from armlab.recordings.recording import Recording
+from armlab.recordings.plain_least_squares import PlainLayout, PlainModel
+from armlab.recordings.recording import Recording, Run
+from problem.arm import Arm
+from problem.motion import Motion
+from problem.robot_file import load_arm
 
 
 def friction() -> Recording:
@@ -43,6 +47,29 @@ def test_the_model_that_goes_to_files_predicts_as_plain_least_squares_does(yards
     rms = np.sqrt(np.mean(own**2, axis=0))
     np.testing.assert_allclose(np.sqrt(np.mean(written**2, axis=0)), rms, rtol=0.02)
     assert {part.effect for part in model.structure.components} >= {"coulomb_friction", "viscous_friction"}
+
+
+def turned(arm: Arm, angle: float) -> Arm:
+    """Each joint turned a little, as rounded angles of a robot file do: columns are nearly dependent then."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    turn = np.array([[1, 0, 0, 0], [0, cosine, -sine, 0], [0, sine, cosine, 0], [0, 0, 0, 1]])
+    return replace(arm, joints=tuple(replace(each, before=each.before @ turn) for each in arm.joints))
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-6, 1e-5])
+@pytest.mark.parametrize("robot", ["irb120-arm", "kuka-kr300", "staubli-tx40"])
+def test_the_model_that_goes_to_files_has_the_torque_of_any_plain_model(robot: str, angle: float) -> None:
+    arm = turned(load_arm(robot), angle)
+    time = np.arange(0, 8, 0.01)
+    waves = np.random.default_rng(0).uniform(0.2, 1.0, (3, len(arm)))
+    position = sum(wave * np.sin(wave * (number + 1) * time[:, None] + number) for number, wave in enumerate(waves))
+    runs = [Run("run.csv", "identify", time, np.asarray(position), np.asarray(position) ** 2)]
+    layout = PlainLayout(arm, tuple(range(len(arm))), np.ones(len(arm)))
+    values = np.random.default_rng(1).uniform(0.1, 1.0, len(layout.names))
+    model = Yardstick(PlainModel(layout, 5.0, values), 5.0).as_torque_model(runs)
+    states = Motion(*np.random.default_rng(2).uniform(-1, 1, (3, 50, len(arm))))
+    expected = layout.matrix(states) @ values
+    np.testing.assert_allclose(model.torque(states), expected, atol=1e-6 * np.abs(expected).max())
 
 
 def test_components_that_no_finding_names_are_not_claimed(yardstick: Yardstick) -> None:

@@ -15,20 +15,19 @@ from armlab.common.arrays import Array
 from armlab.common.errors import DataError
 from armlab.diagnosis.torque.predict.prediction import identification_runs
 from armlab.diagnosis.torque.rows.data import Observed, rows_in
+from armlab.effects.scene import instants
 from armlab.identification.components import usual_components
+from armlab.identification.estimators.least_squares import least_squares
 from armlab.identification.identifier import Identifier
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.cutoff_trial import choose_cutoff_hz
 from armlab.recordings.plain_least_squares import PlainModel, fit_plain_rows, prepare_rows
 from armlab.recordings.recording import Run
 from problem.arm import Arm
+from problem.motion import Motion
 
-PARAMETER_OF = {
-    "rotor_inertia": "rotor_inertia",
-    "coulomb_friction": "coulomb",
-    "viscous_friction": "viscous",
-    "torque_offset": "offset",
-}
+ROUNDING = 1e-12  # of the largest singular value
+PROBE_STATES = 200  # random states in which a model has the torque of plain least squares
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,15 +42,17 @@ class Yardstick:
         return np.concatenate([each.torque - each.filter(self.model.predict(each.run)) for each in observed.signals])
 
     def as_torque_model(self, runs: Sequence[Run]) -> TorqueModel:
-        """The same as a model that goes to files; intervals are of the identification with the same terms."""
+        """The same as a model that goes to files; intervals are of the identification with the same terms.
+
+        Which of several dependent columns are left out differs between the two; the torque does not.
+        """
         plain, arm = self.model, self.model.layout.arm
         components = usual_components(arm, plain.layout.top_speed)
         fitted = Identifier(arm, components, cutoff_hz=self.cutoff_hz).fit(runs).model_
-        known = dict(zip(plain.layout.names, plain.values.tolist(), strict=True))
-        links = np.array([known.get(name, 0.0) for name in arm.parameter_names])
-        parts = (f"{PARAMETER_OF[part.effect]}{part.joint}" for part in fitted.structure.components)
-        values = [*fitted.structure.base.values(links), *(known.get(name, 0.0) for name in parts)]
-        return TorqueModel(**(vars(fitted) | {"values": np.array(values)}))
+        states = Motion(*np.random.default_rng(0).uniform(-1, 1, (3, PROBE_STATES, len(arm))))
+        torque = plain.layout.matrix(states) @ plain.values
+        values = least_squares(fitted.structure.matrix(instants(arm, states)), torque.ravel(), ROUNDING)
+        return TorqueModel(**(vars(fitted) | {"values": values}))
 
 
 def fit_yardstick(arm: Arm, observed: Observed) -> Yardstick | None:
