@@ -9,13 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.torque.columns.links import link_prior
 from armlab.diagnosis.torque.conclude import conclude
-from armlab.diagnosis.torque.rows.data import in_fixed_order, observe
+from armlab.diagnosis.torque.rows.data import Observed, in_fixed_order, observe, rows_in
 from armlab.diagnosis.torque.rows.simulation import read_simulation, reason_misread
 from armlab.diagnosis.torque.search.fitted_model import (
     FittedModel,
@@ -27,7 +28,7 @@ from armlab.recordings.dead_joints import leave_dead_joints_out
 from armlab.recordings.identifiable import reason_impossible, reason_not_identifiable
 from armlab.recordings.reading.answer import Answer, read_rightly, with_joints_left_out
 from armlab.recordings.reading.tuning import ReadingTuning
-from armlab.recordings.recording import Recording
+from armlab.recordings.recording import ROLES, Recording, Role
 from problem.base_parameters import base_parameters
 from problem.pseudo_inertia import are_bodies
 
@@ -74,13 +75,10 @@ def diagnose(
 
 def _only_if_explained(found: Diagnosis, setup: Answer | None, tuning: ReadingTuning) -> Diagnosis:
     """The diagnosis, or an inconclusive one where neither a reading nor physics explains the torque."""
-    observed = found.observed
-    if observed is None or found.simulation.kind == "simulated":
+    observed, final = found.observed, found.final
+    if observed is None or final is None or not found.fit or found.simulation.kind == "simulated":
         return found
-    held_out = np.concatenate([observed.torque[each.start : each.stop] for each in observed.of_role("validate")])
-    spread = np.maximum(np.std(held_out, axis=0), SMALLEST_TORQUE)
-    left = [each.after / spread[each.joint - 1] for each in found.fit]
-    share = float(np.exp(np.mean(np.log(np.maximum(left, SMALLEST_SHARE)))))
+    fitted, share = (_share_left(observed, final, role) for role in ROLES)
     if share <= tuning.max_unexplained:
         return found
     tried = f", however it is read ({setup.looks} readings were tried)" if setup is not None and setup.looks > 1 else ""
@@ -88,10 +86,24 @@ def _only_if_explained(found: Diagnosis, setup: Answer | None, tuning: ReadingTu
         f"Links, friction and all other physics leave {share:.0%} of the recorded torque{tried}: another robot, or "
         "torque that is none? Move one joint alone and see which columns change."
     )
+    if fitted <= tuning.max_unexplained:
+        reason = (
+            f"The model leaves {fitted:.0%} of the torque that it was fitted to, and {share:.0%} of what was held out: "
+            "the motion is too short, or too unlike what was held out, to tell its numbers. Record longer runs in "
+            "which all joints move."
+        )
     return Diagnosis(found.recording, found.simulation, "inconclusive", reason, observed)
 
 
-SMALLEST_TORQUE, SMALLEST_SHARE = 1e-12, 1e-6  # N m; of the torque
+def _share_left(observed: Observed, final: Array, role: Role) -> float:
+    """What a model leaves (rows, joints) of the torque of a role: over its scatter, geometric mean over the joints."""
+    rows = rows_in(observed.of_role(role), observed.rows)
+    spread = np.std(observed.torque[rows], axis=0)
+    left = np.sqrt(np.mean(final[rows] ** 2, axis=0))[spread > 0] / spread[spread > 0]
+    return float(np.exp(np.mean(np.log(np.maximum(left, SMALLEST_SHARE)))))
+
+
+SMALLEST_SHARE = 1e-6  # of the torque
 
 
 def _reading_alone(
