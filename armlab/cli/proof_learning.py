@@ -127,7 +127,8 @@ def calibrate_reading(work: Path, out: Path) -> Iterator[str]:
     bound, verdicts = bound_of(readings), list(leave_each_arm_out(readings, tuning))
     yield from bound_lines(verdicts, bound)
     told, count = share_told(readings, bound)
-    yield f"{len(readings)} recordings of {len(verdicts)} arms: bound {bound:.3f}; {told} of {count} mistakes reach it"
+    arms = f"{len(readings)} recordings and halves of {len(verdicts)} arms"
+    yield f"{arms}: bound {bound:.3f}; {told} of {count} mistakes reach it"
     for path in write_bound(readings, verdicts, out):
         yield f"wrote {path}"
 

@@ -525,11 +525,11 @@ def test_what_rises_counts_twice_and_what_is_not_sure_counts_nothing() -> None:
     """Three joints fall by 1, 0.5 and -0.2 in every block; then the blocks differ by 0.4 at the first one."""
     falls = np.array([1.0, 0.5, -0.2])
     after = Errors(np.full(3, 0.1), np.zeros((4, 3)))
-    sure = View.between(Errors(0.1 * np.exp(falls), np.tile(falls, (4, 1))), after, 0.01)
+    sure = View.between(Errors(0.1 * np.exp(falls), np.tile(falls, (4, 1))), after, 0.01, 4)
     assert sure.least_gain(2.0, of_one_joint=False) == pytest.approx(1.0 + 0.5 - 2 * 0.2)
     assert sure.least_gain(2.0, of_one_joint=True) == pytest.approx(1.0)
     blocks = np.tile(falls, (4, 1)) + 0.4 * np.array([[1, 0, 0], [-1, 0, 0], [1, 0, 0], [-1, 0, 0]])
-    unsure = View.between(Errors(0.1 * np.exp(falls), blocks), after, 0.01)
+    unsure = View.between(Errors(0.1 * np.exp(falls), blocks), after, 0.01, 4)
     deviation = 0.4 * np.sqrt(4 / 3) / 2  # of the mean of four
     assert unsure.least_gain(2.0, of_one_joint=False) == pytest.approx(1.1 - 2 * deviation)
 

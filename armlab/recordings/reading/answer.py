@@ -8,7 +8,7 @@ from armlab.common.arrays import Array
 from armlab.recordings.dead_joints import NO_TORQUE
 from armlab.recordings.reading.corrected import correct_recording
 from armlab.recordings.reading.judge import ReadingJudge
-from armlab.recordings.reading.reading import SPRING, Mistake, Reading, read_as_is
+from armlab.recordings.reading.reading import LINK_DATA, SPRING, Mistake, Reading, read_as_is
 from armlab.recordings.reading.search import Found, find_mistakes
 from armlab.recordings.reading.signs import has_no_sign
 from armlab.recordings.reading.tuning import ReadingTuning
@@ -216,12 +216,12 @@ def _finding(judge: ReadingJudge, found: Found, place: int) -> SetupFinding:
         for share, each in ((before, without), (after, best))
     )
     worst = int(np.argmax(np.log(before) - np.log(after)))
-    if mistake.joint is not None and mistake.effect != "link_data_error":
+    if mistake.joint is not None and mistake.effect != LINK_DATA:
         worst = mistake.joint - 1 if after[mistake.joint - 1] < before[mistake.joint - 1] else worst
     gain, arm = judge.gain(without, best), reading.arm
     rivals = [(each.reading.mistakes[-1], each.loss) for each in found.rivals[place]]
     weights = np.array([best.loss, *(loss for _, loss in rivals)])
-    chances = np.exp(-judge.fitter.channels.blocks * (weights - weights.min()))
+    chances = np.exp(-judge.independent * (weights - weights.min()))
     by_links = best.near is not None and not judge.is_told_by_geometry(without, best, mistake)
     sigmas = gain.near.total_sigmas if by_links else gain.sigmas
     chances = np.append(chances, chances.max() * judge.tuning.other_links_chance if by_links else 0.0)

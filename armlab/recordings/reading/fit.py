@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from armlab.recordings.reading.reading import Reading, second_drives
+from armlab.recordings.reading.reading import LINK_DATA, Reading, second_drives
 from armlab.recordings.reading.signals import Channels
 from armlab.recordings.reading.tuning import ReadingTuning
 from problem.arm import Arm, Link
@@ -94,8 +94,11 @@ def _typical_prior(arm: Arm, mass: float, reach: float) -> BodyPrior:
     return _prior(replace(arm, links=links))
 
 
-def _prior(arm: Arm) -> BodyPrior:
+def _prior(arm: Arm, load_share: float = 0.0) -> BodyPrior:
+    """load_share: of a link of the arm, that the last one may carry: its own data do not say how large a load is."""
     pseudos = regular_nominal(arm)
+    link = pseudos.mean(axis=0)
+    pseudos[-1] += load_share * np.diag([*(np.trace(link[:3, :3]) / 3,) * 3, link[3, 3]])
     return BodyPrior(arm.parameters, entropic_information(pseudos), pseudos)
 
 
@@ -146,7 +149,7 @@ class Fitter:
     channels: Channels
     tuning: ReadingTuning
     _columns: dict[tuple[object, ...], ReadingColumns] = field(default_factory=dict)
-    _priors: dict[bytes, BodyPrior] = field(default_factory=dict)
+    _priors: dict[tuple[bytes, float], BodyPrior] = field(default_factory=dict)
 
     @property
     def fold(self) -> NDArray[np.intp]:
@@ -171,26 +174,33 @@ class Fitter:
             self._columns[key] = make_columns(reading.arm, motion, drive_signals, self.fold)
         return self._columns[key]
 
-    def prior(self, reading: Reading, torque: Array) -> BodyPrior:
-        """About the links of the simulation, or about bodies of the size that the torque suggests."""
+    def prior(self, reading: Reading, torque: Array, may_carry: bool = False) -> BodyPrior:
+        """About the links of the simulation, or about bodies of the size that the torque suggests.
+
+        may_carry: whether the last link may carry a load as large as a link, however small it is itself.
+        """
         arm = reading.arm
         if reading.inertial is not None:
-            key = reading.inertial.tobytes()
+            load = may_carry / self.tuning.free_width
+            key = reading.inertial.tobytes(), load
             if key not in self._priors:
-                self._priors[key] = _prior(replace(arm, links=links_of(reading.inertial)))
+                self._priors[key] = _prior(replace(arm, links=links_of(reading.inertial)), load)
             return self._priors[key]
         reach = sum(float(np.linalg.norm(j.before[:3, 3]) + np.linalg.norm(j.after[:3, 3])) for j in arm.joints) or 1.0
         turning = arm.joints[0].kind == "revolute"
         mass = float(np.std(torque, axis=0).max()) / (9.81 * (reach if turning else 1.0))
         return _typical_prior(arm, 2.0 ** round(np.log2(max(mass, 1e-6))), round(reach, 3))
 
-    def scores(self, reading: Reading, widths: Sequence[float], physical: bool = False) -> list[ReadingScore]:
+    def scores(
+        self, reading: Reading, widths: Sequence[float], physical: bool = False, may_carry: bool = False
+    ) -> list[ReadingScore]:
         """Held-out errors with links of each width about the simulation.
 
-        The last link may carry a load: it is free in any case. physical: links that bodies can have.
+        The last link is free, but where its own data are said to be wrong. physical: links that bodies can have.
+        may_carry: see `prior`.
         """
         columns, torque, weight = self._target(reading)
-        prior = self.prior(reading, torque)
+        prior = self.prior(reading, torque, may_carry)
         second = tuple(place is not None for place in second_drives(reading))
         layout = _layout(reading.joints, reading.springs, second)
         products = [_products(columns, torque, self.fold == number) for number in range(FOLDS)]
@@ -199,7 +209,8 @@ class Fitter:
         out = []
         for width in widths:
             each = np.full(reading.joints, width)
-            each[-1] = max(width, self.tuning.free_width)
+            if not says_last_link(reading):
+                each[-1] = max(width, self.tuning.free_width)
             squares, distance, fitted = np.zeros(reading.joints), 0.0, []
             for number, (gram, product) in enumerate(normal):
                 task = _Task(gram, product, prior, each**-2.0, layout)
@@ -277,6 +288,11 @@ class Fitter:
             power = float(model @ model)
             out[joint] = float(model @ measured) / power if power > 0 else 0.0
         return out
+
+
+def says_last_link(reading: Reading) -> bool:
+    """Whether a mistake is about the data of the last link: with other data a load is no reason for it."""
+    return any(each.effect == LINK_DATA and each.joint == reading.joints for each in reading.mistakes)
 
 
 def _products(columns: ReadingColumns, torque: Array, rows: NDArray[np.bool_]) -> Array:

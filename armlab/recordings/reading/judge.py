@@ -12,9 +12,11 @@ from functools import cached_property
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.common.probabilities import student_quantile
+from armlab.recordings.cutoff import travel_bandwidth
 from armlab.recordings.reading.fit import Fitter, ReadingScore
 from armlab.recordings.reading.mistakes import POSITION, TORQUE, improbability, is_of_one_joint
-from armlab.recordings.reading.reading import Mistake, Reading
+from armlab.recordings.reading.reading import LINK_DATA, Mistake, Reading
 from armlab.recordings.reading.signals import thin_channels
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording, Run
@@ -68,13 +70,16 @@ class View:
     total_sigmas: float
 
     @classmethod
-    def between(cls, before: Errors, after: Errors, smallest: float) -> "View":
-        """From one reading to another of the same blocks; errors below the smallest one count as that."""
+    def between(cls, before: Errors, after: Errors, smallest: float, independent: float) -> "View":
+        """From one reading to another of the same blocks; errors below the smallest one count as that.
+
+        independent: how many blocks differ from each other by chance alone.
+        """
         falls = np.log(np.maximum(before.errors, smallest)) - np.log(np.maximum(after.errors, smallest))
         blocks = before.losses - after.losses
         totals = np.sum(blocks, axis=1, keepdims=True)
-        total = float(_deviations(totals)[0])
-        return cls(falls, _deviations(blocks), total, float(np.mean(totals)) / max(total, 1e-9))
+        total = float(_deviations(totals, independent)[0])
+        return cls(falls, _deviations(blocks, independent), total, float(np.mean(totals)) / max(total, 1e-9))
 
     @property
     def best(self) -> int:
@@ -97,9 +102,9 @@ class View:
         return min(total, alone) if of_one_joint else total
 
 
-def _deviations(blocks: Array) -> Array:
-    """Standard deviations of means over the blocks (blocks, columns)."""
-    return np.asarray(np.std(blocks, axis=0, ddof=1) / np.sqrt(len(blocks)))
+def _deviations(blocks: Array, independent: float) -> Array:
+    """Standard deviations of means over the blocks (blocks, columns), of which so many are independent."""
+    return np.asarray(np.std(blocks, axis=0, ddof=1) / np.sqrt(independent))
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +132,7 @@ class ReadingJudge:
     judging: Fitter
     recording: Recording
     looks: list[int] = field(default_factory=lambda: [0])
-    _errors: dict[int, tuple[Reading, Errors, Errors]] = field(default_factory=dict)
+    _errors: dict[tuple[int, bool], tuple[Reading, Errors, Errors]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, recording: Recording, tuning: ReadingTuning) -> "ReadingJudge | None":
@@ -144,6 +149,17 @@ class ReadingJudge:
     def tuning(self) -> ReadingTuning:
         """The numbers of this stage."""
         return self.fitter.tuning
+
+    @cached_property
+    def independent(self) -> float:
+        """Stretches of time that tell something of their own: two a period of the motion, and no more than blocks."""
+        periods = sum(_periods(run) for run in self.recording.runs)
+        return float(np.clip(2 * periods, 2, self.judging.channels.blocks))
+
+    @cached_property
+    def sure(self) -> float:
+        """Standard deviations that are taken off what a reading explains."""
+        return student_quantile((1 + CONFIDENCE) / 2, self.independent - 1)
 
     def trial(self, reading: Reading) -> Trial:
         """The errors of a reading with links near those of the simulation, and free."""
@@ -163,14 +179,18 @@ class ReadingJudge:
         tuning = self.tuning
         return (tuning.free_width,) if reading.inertial is None else (tuning.near_width, tuning.free_width)
 
-    def errors(self, reading: Reading) -> tuple[Errors, Errors]:
-        """Held-out errors near the links of the simulation, and with free ones: the same twice without a simulation."""
-        if id(reading) not in self._errors:
+    def errors(self, reading: Reading, may_carry: bool = False) -> tuple[Errors, Errors]:
+        """Held-out errors near the links of the simulation, and with free ones: the same twice without a simulation.
+
+        may_carry: whether the last link may carry a load as large as a link.
+        """
+        key = id(reading), may_carry
+        if key not in self._errors:
             widths = self._widths(reading)
-            fits = zip(self.judging.scores(reading, widths), self.judging.scores(reading, widths, True), strict=True)
-            out = [self._best_fit(reading, each) for each in fits]
-            self._errors[id(reading)] = (reading, out[0], out[-1])
-        return self._errors[id(reading)][1:]
+            views = (self.judging.scores(reading, widths, physical, may_carry) for physical in (False, True))
+            out = [self._best_fit(reading, each) for each in zip(*views, strict=True)]
+            self._errors[key] = (reading, out[0], out[-1])
+        return self._errors[key][1:]
 
     def _best_fit(self, reading: Reading, fits: Sequence[ReadingScore]) -> Errors:
         """Of each joint the fit that predicts it better: a reading that is wrong does so by both."""
@@ -180,17 +200,17 @@ class ReadingJudge:
         chosen = np.where(better, shares[1], shares[0])
         return Errors(errors, np.asarray(0.5 * np.log(chosen + self.tuning.smallest_error**2)))
 
-    def gain(self, before: Trial, after: Trial) -> Gain:
-        """How far errors fall from one reading to another."""
+    def gain(self, before: Trial, after: Trial, may_carry: bool = False) -> Gain:
+        """How far errors fall from one reading to another. may_carry: the last link, as the first one has it."""
         smallest = self.tuning.smallest_error
-        pairs = zip(self.errors(before.reading), self.errors(after.reading), strict=True)
-        return Gain(*(View.between(first, second, smallest) for first, second in pairs))
+        pairs = zip(self.errors(before.reading, may_carry), self.errors(after.reading), strict=True)
+        return Gain(*(View.between(first, second, smallest, self.independent) for first, second in pairs))
 
     def fits_alike(self, other: Trial, best: Trial) -> bool:
         """Whether the best reading does not surely explain more than another one, nor as much as a mistake has to."""
         if other.loss - best.loss >= self.tuning.least_evidence:
             return False
-        return self.gain(other, best).near.total_sigmas < self.tuning.sure_deviations
+        return self.gain(other, best).near.total_sigmas < self.sure
 
     def is_usual(self, trial: Trial) -> bool:
         """Whether no joint leaves more than joints of real arms do."""
@@ -215,14 +235,14 @@ class ReadingJudge:
         return self.may_explain(before, after, mistake, least) and self.evidence(before, after, mistake) >= least
 
     def improbability(self, reading: Reading) -> float:
-        """Of the last mistake of a reading, nats a block: what it has to explain better than the commonest one."""
-        return improbability(reading.mistakes[-1], reading.joints) / self.fitter.channels.blocks
+        """Of the last mistake of a reading, nats a stretch: what it has to explain better than the commonest one."""
+        return improbability(reading.mistakes[-1], reading.joints) / self.independent
 
     def cost(self, trial: Trial) -> float:
         """The loss of a reading, and what each of its mistakes has to explain to be named, nats."""
         chance = sum(improbability(each, trial.reading.joints) for each in trial.reading.mistakes)
         mistakes = len(trial.reading.mistakes)
-        return trial.loss + mistakes * self.tuning.least_evidence + chance / self.fitter.channels.blocks
+        return trial.loss + mistakes * self.tuning.least_evidence + chance / self.independent
 
     def overall_error(self, trial: Trial) -> float:
         """Held-out error near the simulation's links, geometric mean over the joints, of the torque's scatter."""
@@ -241,7 +261,7 @@ class ReadingJudge:
             if is_of_one_joint(mistake)
             else [float(np.sum(each)) for each in falls]
         )
-        chance = improbability(mistake, after.reading.joints) / self.fitter.channels.blocks
+        chance = improbability(mistake, after.reading.joints) / self.independent
         return max(gains) >= QUICK_SHARE * (least + chance)
 
     def is_told_by_geometry(self, before: Trial, after: Trial, mistake: Mistake) -> bool:
@@ -252,14 +272,18 @@ class ReadingJudge:
         """What a reading explains beyond chance, nats, in the view that tells more.
 
         By geometry: free links show it. By the links of the simulation: near them the reading is about as good as any
-        links make it.
+        links make it. What is said of the data of a link, free links cannot show; of the last link it has to explain
+        more than a load does.
         """
-        gain = self.gain(before, after)
+        may_carry = mistake.effect == LINK_DATA and mistake.joint == after.reading.joints
+        gain = self.gain(before, after, may_carry)
         free = self._evidence(gain.free, after.reading, mistake)
         if before.near is None:
             return free
+        if mistake.effect == LINK_DATA:
+            free = -improbability(mistake, after.reading.joints) / self.independent
         floor = self.tuning.smallest_error
-        (first, _), (near, best) = self.errors(before.reading), self.errors(after.reading)
+        (first, _), (near, best) = self.errors(before.reading, may_carry), self.errors(after.reading)
         gap, left = (
             float(np.sum(np.log(np.maximum(each.errors, floor) / np.maximum(best.errors, floor))))
             for each in (first, near)
@@ -270,8 +294,8 @@ class ReadingJudge:
 
     def _evidence(self, view: View, reading: Reading, mistake: Mistake) -> float:
         """What surely falls, less what the best of so many wrong readings explains by chance."""
-        least = view.least_gain(self.tuning.sure_deviations, is_of_one_joint(mistake))
-        return least - improbability(mistake, reading.joints) / self.fitter.channels.blocks
+        least = view.least_gain(self.sure, is_of_one_joint(mistake))
+        return least - improbability(mistake, reading.joints) / self.independent
 
     def is_size_plausible(self, parent: Reading, reading: Reading) -> bool:
         """Whether a last mistake that scales makes sizes more alike, as a wrong unit does.
@@ -282,7 +306,7 @@ class ReadingJudge:
         mistake = reading.mistakes[-1]
         if mistake.effect == "unit_error" and mistake.form == POSITION:
             return mistake.joint is None or self._is_travel_more_alike(parent, reading, mistake.joint - 1)
-        links = mistake.effect == "link_data_error" and mistake.form != "centre_sign"
+        links = mistake.effect == LINK_DATA and mistake.form != "centre_sign"
         scales = links or (mistake.effect == "unit_error" and mistake.form == TORQUE)
         if not scales:
             return True
@@ -318,8 +342,15 @@ class ReadingJudge:
 
 
 SMALLEST = 1e-300
+CONFIDENCE = 0.95  # of what a reading surely explains, two-sided
 DOUBT_SHARE = 0.5  # of the evidence for a name: what cannot be excluded
 QUICK_SHARE = 0.75  # of a fall with links that bodies can have, which links without that bound show
+
+
+def _periods(run: Run) -> float:
+    """How many periods the motion of the fastest joint has."""
+    fastest = max(travel_bandwidth(joint[:, None], run.rate_hz) for joint in run.position.T)
+    return fastest * float(run.time[-1] - run.time[0])
 
 
 def _confirms_clock(run: Run, likeness: float) -> bool:

@@ -22,7 +22,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.settings import read_yaml, validate
-from armlab.recordings.reading.reading import BOTH, OF_LINKS, SPRING, Mistake, Reading
+from armlab.recordings.reading.reading import BOTH, LINK_DATA, OF_LINKS, SPRING, Mistake, Reading
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
 from problem.pseudo_inertia import link_from_centre_of_mass, links_of
@@ -215,7 +215,7 @@ def robot_file_meanings(reading: Reading, recording: Recording) -> Iterator[Read
             factors[slice(None) if link is None else link] = scale
             number = None if link is None else link + 1
             parameters = (("factor", factor, ""),) if factor != -1.0 else ()
-            mistake = Mistake("link_data_error", number, form=form, parameters=parameters)
+            mistake = Mistake(LINK_DATA, number, form=form, parameters=parameters)
             yield _with_links(reading, reading.inertial * factors.ravel(), mistake)
 
 
@@ -276,7 +276,7 @@ THREADS_AND_READINGS = {
     "gravity_compensated_torque": (7, 2, 0, 0),
     "dh_convention": (3, 1, 0, 0),
     "inertia_reference": (3, 3, 0, 0),
-    "link_data_error": (11, 5, 5, 0),
+    LINK_DATA: (11, 5, 5, 0),
     "clock_error": (5, 13, 0, 0),
     "time_delay": (2, 20, 0, 0),
     "channel_skew": (3, 0, 20, 0),

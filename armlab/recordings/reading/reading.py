@@ -16,6 +16,7 @@ from problem.arm import Arm
 
 BOTH = "position and torque"  # the form of a mistake
 OF_LINKS = "of the links"  # the form of a mistake
+LINK_DATA = "link_data_error"
 SPRING = "cable_stiffness"  # physics that a joint may have in the place of a mistake
 
 

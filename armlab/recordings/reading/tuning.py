@@ -97,12 +97,6 @@ class ReadingTuning:
         meaning="what a mistake that is named has to explain beyond chance",
         source="the best wrong readings of real arms: armlab proof calibrate-reading",
     )
-    sure_deviations: float = tuned(
-        2.0,
-        unit="standard deviations",
-        meaning="between blocks of time, that are taken off what a reading explains",
-        source="a two-sided interval of 95 %",
-    )
     max_open_gap: float = tuned(
         0.25,
         unit="of the gap",

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from armlab.recordings.reading.reading import OF_LINKS, SPRING, Mistake
+from armlab.recordings.reading.reading import LINK_DATA, OF_LINKS, SPRING, Mistake
 from problem.arm import Arm
 from problem.joint_words import joint_in_words, joints_in_words, links_in_words
 
@@ -93,7 +93,7 @@ def describe(mistake: Mistake, arm: Arm) -> str:
     if mistake.effect == "encoder_offset":
         turn = f"{np.rad2deg(value):+.1f} deg" if mistake.parameters[0][2] == "rad" else f"{value:+.4g} m"
         return f"the zero of {place} is off: add {turn}"
-    if mistake.effect == "link_data_error":
+    if mistake.effect == LINK_DATA:
         what = {"centre_sign": "the centre has the other sign", "mass_unit": f"mass data are {value:g} times the true"}
         return f"{link}: {what.get(form, f'inertias are {value:g} times the true')}"
     if mistake.effect in ("time_delay", "channel_skew"):

@@ -1,12 +1,14 @@
 """What a reading mistake has to explain: a bound learnt on recordings of real arms that are read rightly.
 
-On each of them the best wrong reading explains something by chance, its evidence (`Judge.evidence`). The bound is the
-one-sided prediction limit of these best evidences for one more arm (Hahn and Meeker 1991, section 4.8),
+On each of them, and on each half of it, the best wrong reading explains something by chance, its evidence
+(`Judge.evidence`): a shorter recording by more. The bound is the one-sided prediction limit of these best evidences for
+one more recording of another arm (Hahn and Meeker 1991, section 4.8),
 
     bound = mean + t(1 - chance, arms - 1) sd sqrt(1 + 1 / arms).
 
-All recordings of an arm count once, by the largest of them. The other class are mistakes: each reading that was tried
-is taken for the right one in turn, and what the recording as it is explains beyond it is the evidence for this mistake.
+Arms count alike in mean and sd, whatever the number of their recordings. The other class are mistakes: each reading
+that was tried is taken for the right one in turn, and what the recording as it is explains beyond it is the evidence
+for this mistake.
 """
 
 import json
@@ -22,6 +24,8 @@ from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.diagnosis.torque.rows.simulation import read_simulation
 from armlab.proof.open.likeness.real_arms import RealFolder
+from armlab.proof.open.relations.variants import half
+from armlab.recordings.identifiable import reason_not_identifiable
 from armlab.recordings.load import load_recording
 from armlab.recordings.motion import is_motion_only
 from armlab.recordings.reading.answer import read_rightly
@@ -68,12 +72,15 @@ class ArmVerdict:
 
 
 def best_wrong_readings(folders: Sequence[RealFolder], tuning: ReadingTuning) -> Iterator[WrongReading]:
-    """The best wrong reading of each recording with torque that is compared with links, and can be judged."""
+    """The best wrong reading of each recording with torque that is compared with links, and of each half of it."""
     for folder in folders:
         recording = _recording(folder)
-        judge = None if recording is None else ReadingJudge.of(recording, tuning)
-        if recording is not None and judge is not None:
-            yield _best_wrong_reading(folder, recording, judge)
+        if recording is None:
+            continue
+        for each in (recording, half(recording, 0), half(recording, 1)):
+            judge = None if reason_not_identifiable(each) else ReadingJudge.of(each, tuning)
+            if judge is not None:
+                yield _best_wrong_reading(folder, each, judge)
 
 
 def _recording(folder: RealFolder) -> Recording | None:
@@ -92,6 +99,7 @@ def _best_wrong_reading(folder: RealFolder, recording: Recording, judge: Reading
     falling = [each for each in tried[:JUDGED] if judge.may_explain(start, each, each.reading.mistakes[-1], 0.0)]
     judged = [(judge.evidence(start, each, each.reading.mistakes[-1]), each) for each in falling or tried[:1]]
     evidence, best = max(judged, key=lambda pair: pair[0])
+    evidence = max(evidence, -judge.improbability(best.reading))  # the recording as it is explains as much
     spread = tried[:: max(len(tried) // MISTAKES, 1)]
     mistakes = [
         judge.evidence(each, start, each.reading.mistakes[-1]) for each in spread if _is_seen(judge, each, start)
@@ -107,13 +115,19 @@ def _is_seen(judge: ReadingJudge, wrong: Trial, right: Trial) -> bool:
 
 
 def bound_of(readings: Sequence[WrongReading]) -> float:
-    """The prediction limit of the best evidence of one more arm, nats. Raises InputError for less than three arms."""
-    arms = {each.folder.arm for each in readings}
-    if len(arms) < 3:
-        raise InputError(f"recordings of {len(arms)} arms: a bound needs those of three arms or more")
-    best = np.array([max(each.evidence for each in readings if each.folder.arm == arm) for arm in sorted(arms)])
-    spread = np.std(best, ddof=1) * np.sqrt(1 + 1 / len(best))
-    return round(float(np.mean(best) + student.ppf(1 - CHANCE, len(best) - 1) * spread), DIGITS)
+    """The prediction limit of the best evidence of a recording of one more arm, nats.
+
+    Raises InputError for less than three arms.
+    """
+    arms = [each.folder.arm for each in readings]
+    count = len(set(arms))
+    if count < 3:
+        raise InputError(f"recordings of {count} arms: a bound needs those of three arms or more")
+    best = np.array([each.evidence for each in readings])
+    weight = np.array([1 / (count * arms.count(arm)) for arm in arms])
+    mean = float(weight @ best)
+    deviation = float(np.sqrt(weight @ (best - mean) ** 2 * (count + 1) / (count - 1)))  # of one more, with the mean's
+    return round(mean + float(student.ppf(1 - CHANCE, count - 1)) * deviation, DIGITS)
 
 
 def leave_each_arm_out(readings: Sequence[WrongReading], tuning: ReadingTuning) -> Iterator[ArmVerdict]:
@@ -121,17 +135,18 @@ def leave_each_arm_out(readings: Sequence[WrongReading], tuning: ReadingTuning) 
     bound = bound_of(readings)
     for arm in sorted({each.folder.arm for each in readings}):
         own = [each for each in readings if each.folder.arm == arm]
+        folders = list({each.folder.name: each.folder for each in own}.values())
         without = bound_of([each for each in readings if each.folder.arm != arm])
-        named = [tuple(_named(own, replace(tuning, least_evidence=each))) for each in (bound, without)]
+        named = [tuple(_named(folders, replace(tuning, least_evidence=each))) for each in (bound, without)]
         licensed = all(each.folder.licensed for each in own)
         yield ArmVerdict(arm, licensed, max(own, key=lambda each: each.evidence), without, named[0], named[1])
 
 
-def _named(readings: Sequence[WrongReading], tuning: ReadingTuning) -> Iterator[str]:
-    for each in readings:
-        recording = load_recording(each.folder.path)
+def _named(folders: Sequence[RealFolder], tuning: ReadingTuning) -> Iterator[str]:
+    for folder in folders:
+        recording = load_recording(folder.path)
         answer = read_rightly(recording, read_simulation(recording, None).inertial, tuning)
-        yield from (f"{each.folder.name}: {finding.mistake.label}" for finding in answer.findings)
+        yield from (f"{folder.name}: {finding.mistake.label}" for finding in answer.mistakes)
 
 
 def share_told(readings: Sequence[WrongReading], bound: float) -> tuple[int, int]:
@@ -165,9 +180,9 @@ def write_bound(readings: Sequence[WrongReading], verdicts: Sequence[ArmVerdict]
     hidden = sum(not each.licensed for each in verdicts)
     page = markdown_page(
         "What a reading mistake has to explain",
-        f"From {len(readings)} recordings of {len(verdicts)} real arms, read rightly: the best wrong reading of one "
-        f"more arm explains more than {bound:.2f} nats with a probability of {CHANCE:.0%}. Of {count} mistakes that "
-        f"can be seen, were they there, {told} explain as much.",
+        f"From {len(readings)} recordings and halves of {len(verdicts)} real arms, read rightly: the best wrong "
+        f"reading of one more arm explains more than {bound:.2f} nats with a probability of {CHANCE:.0%}. Of {count} "
+        f"mistakes that can be seen, were they there, {told} explain as much.",
         f"Each arm with the bound that the others make, all but {hidden} whose recordings have no licence:",
         markdown_table(
             ("arm", "best wrong reading", "evidence", "bound without it", "share", "said", "said without it"),
