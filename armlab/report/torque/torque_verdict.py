@@ -66,8 +66,7 @@ class FirstScreen:
 def first_screen(diagnosis: Diagnosis) -> FirstScreen:
     """A mistake of the reading first, else where the error comes from, else the verdict itself."""
     first, second = verdict_sentences(diagnosis)
-    setup = diagnosis.setup.sentence if diagnosis.setup else ""
-    if setup and diagnosis.claims:
+    if diagnosis.setup is not None and diagnosis.setup.mistakes and diagnosis.claims:
         second = f"Of the recording read rightly: {second[0].lower()}{second[1:]}"
     return FirstScreen(first, (second,) if second else ())
 
