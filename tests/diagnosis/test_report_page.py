@@ -446,7 +446,8 @@ def test_an_unknown_is_shown_with_its_surrogate_over_what_it_depends_on_and_mark
 
 
 def test_a_wrong_reading_is_the_headline_and_nothing_is_told_twice(found: Diagnosis) -> None:
-    answer: Any = SimpleNamespace(sentence="The recording is read wrongly: joint 1 counts the other way round.")
+    wrong = "The recording is read wrongly: joint 1 counts the other way round."
+    answer: Any = SimpleNamespace(sentence=wrong, mistakes=("joint_direction",))
     shown = first_screen(replace(found, setup=answer))
     assert shown.headline == answer.sentence
     assert shown.paragraphs[0].startswith("Of the recording read rightly: ")
