@@ -70,7 +70,7 @@ def gram_matrix(arm: Arm, motion: Motion, columns: NDArray[np.intp]) -> Array:
     a column does not exist.
     """
     joints = _check_joint_count(arm, motion)
-    if arm.coupled:
+    if arm.coupled or arm.unmeasured:
         matrix = observation_matrix(arm, motion)[..., columns]
         return np.asarray(np.swapaxes(matrix, -1, -2) @ matrix)
     return _sum_products(arm, motion, _layout(columns.tobytes(), columns.dtype.str, joints, 0), ffi.NULL)
@@ -86,7 +86,7 @@ def extended_gram_matrix(arm: Arm, motion: Motion, columns: NDArray[np.intp], ow
     owned = own.shape[-1]
     if own.shape[:-1] != motion.position.shape or owned > MAX_OWNED:
         raise ValueError(f"own columns should have the shape {motion.position.shape} and up to {MAX_OWNED} a joint")
-    if arm.coupled:
+    if arm.coupled or arm.unmeasured:
         rigid = observation_matrix(arm, motion)[..., columns]
         rows = np.zeros((*own.shape[:-1], joints, owned))
         rows[..., np.arange(joints), np.arange(joints), :] = own

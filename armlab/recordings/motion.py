@@ -117,6 +117,8 @@ def open_motion_recording(folder: Path) -> tuple[MotionRecording, RecordingFile]
         raise InputError(
             f"columns in {folder / FILE_NAME} has no reference_position: this is no recording of motion only"
         )
+    if file.without_torque:
+        raise InputError(f"without_torque in {folder / FILE_NAME}: a recording of motion only has no torque at all")
     if file.timing is not None or file.gravity is not None or file.restore_gravity:
         raise InputError(f"timing and gravity in {folder / FILE_NAME}: a recording of motion only has neither")
     if file.simulation is not None:

@@ -15,9 +15,10 @@ from refusals import refusal
 from armlab.cli.main import main
 from armlab.identification.identifier import Identifier
 from armlab.recordings.load import load_recording
+from armlab.recordings.motion import load_motion_recording
 from armlab.recordings.plain_least_squares import PlainLayout, fit_plain_rows, prepare_rows, weighted_solution
 from problem.motion import Motion
-from problem.regressor import observation_matrix, rigid_body_torque
+from problem.regressor import gram_matrix, observation_matrix, rigid_body_torque
 from problem.robot_file import load_arm
 
 ALONE = {"runs": SETTINGS["runs"][:1]}
@@ -56,6 +57,8 @@ def test_the_dynamics_leave_the_rows_of_such_a_joint_zero() -> None:
     assert not rows[:, 1].any()
     np.testing.assert_array_equal(rows[:, [0, 2]], whole[:, [0, 2]])
     np.testing.assert_array_equal(rigid_body_torque(part, motion)[:, [0, 2]], rigid_body_torque(arm, motion)[:, [0, 2]])
+    columns, flat = np.arange(30), rows.reshape(60, 30)
+    np.testing.assert_allclose(gram_matrix(part, motion, columns), flat.T @ flat)
 
 
 def test_plain_least_squares_is_that_of_the_other_rows(tmp_path: Path) -> None:
@@ -123,3 +126,12 @@ def test_a_prediction_judges_the_other_joints(tmp_path: Path) -> None:
     assert done.exit_code == 0
     rows = pd.DataFrame(line.split()[:3] for line in done.output.splitlines() if line.startswith("run.csv "))
     assert list(rows[2]) == ["1", "3"]
+
+
+def test_a_recording_of_motion_only_has_no_joint_to_leave_out(tmp_path: Path) -> None:
+    folder = folder_with(tmp_path, frame(), ALONE | {"without_torque": [2]})
+    settings = yaml.safe_load((folder / "recording.yaml").read_text())
+    settings["columns"]["reference_position"] = settings["columns"].pop("torque")
+    settings["units"].pop("torque")
+    (folder / "recording.yaml").write_text(yaml.safe_dump(settings))
+    assert "a recording of motion only has no torque at all" in refusal(load_motion_recording, folder)
