@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from armlab.cli.options import JobCount, OutputPath
-from armlab.cli.output import prints_lines
+from armlab.cli.output import prints_lines, tell_progress
 
 _PATH = click.Path(path_type=Path)
 
@@ -100,12 +100,13 @@ def calibrate_unknown(claims: tuple[Path, ...], unseen: tuple[Path, ...], out: P
 @click.command()
 @click.option("--work", type=OutputPath(), default=Path(".armlab/recordings"), show_default=True)
 @click.option("--out", type=OutputPath(), required=True, help="Folder for bound.json and reading_bound.md.")
+@click.option("--jobs", type=JobCount(), default=2, show_default=True, help="Recordings that are read at a time.")
 @prints_lines
-def calibrate_reading(work: Path, out: Path) -> Iterator[str]:
+def calibrate_reading(work: Path, out: Path, jobs: int) -> Iterator[str]:
     """Learn how much a reading mistake has to explain.
 
     From the best wrong readings of real recordings: the folders below ARMLAB_RECORDINGS, and the public ones, fetched
-    into --work. Each arm is judged once more with the bound that the others make.
+    into --work. Each arm is judged once more with the bound that the others make, and so are parts of its recordings.
     """
     from armlab.common.errors import InputError
     from armlab.proof.open.likeness.real_arms import real_folders
@@ -113,6 +114,7 @@ def calibrate_reading(work: Path, out: Path) -> Iterator[str]:
         best_wrong_readings,
         bound_lines,
         bound_of,
+        count_parts,
         leave_each_arm_out,
         share_told,
         write_bound,
@@ -124,11 +126,13 @@ def calibrate_reading(work: Path, out: Path) -> Iterator[str]:
     if local is None:
         raise InputError(f"no recording folders: {LOCAL_COPIES_VARIABLE} names none")
     readings = list(best_wrong_readings(list(real_folders(local, work)), tuning))
-    bound, verdicts = bound_of(readings), list(leave_each_arm_out(readings, tuning))
+    bound, verdicts = bound_of(readings), list(leave_each_arm_out(readings, tuning, jobs, tell_progress))
     yield from bound_lines(verdicts, bound)
     told, count = share_told(readings, bound)
     arms = f"{len(readings)} recordings and halves of {len(verdicts)} arms"
     yield f"{arms}: bound {bound:.3f}; {told} of {count} mistakes reach it"
+    parts, false = count_parts(verdicts)
+    yield f"without the arm that is judged: {false} mistakes are said of {parts} parts of recordings"
     for path in write_bound(readings, verdicts, out):
         yield f"wrote {path}"
 

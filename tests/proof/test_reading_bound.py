@@ -41,7 +41,7 @@ def test_two_arms_make_no_bound() -> None:
 
 def test_the_page_names_no_recording_without_a_licence(tmp_path: Path) -> None:
     readings = [wrong_reading("free", 0.1), wrong_reading("hidden", 0.3, licensed=False), wrong_reading("open", 0.2)]
-    verdicts = [ArmVerdict(each.folder.arm, each.folder.licensed, each, 0.5, (), ()) for each in readings]
+    verdicts = [ArmVerdict(each.folder.arm, each.folder.licensed, each, 0.5, (), (), 11, ()) for each in readings]
     bound, page = write_bound(readings, verdicts, tmp_path)
     assert "hidden" not in page.read_text(encoding="utf-8")
     assert "free" in page.read_text(encoding="utf-8")

@@ -8,7 +8,15 @@ from small_recordings import frame, recording_in
 
 from armlab.proof.open.relations.all_relations import check_relations, relations_page
 from armlab.proof.open.relations.relations import NULL_PAIRS, QUICK, RELATIONS, Desk, RelationOutcome, check_relation
-from armlab.proof.open.relations.variants import every_other_second, half, one_run, resampled, rewritten, thinned
+from armlab.proof.open.relations.variants import (
+    every_other_second,
+    half,
+    one_run,
+    parts_of,
+    resampled,
+    rewritten,
+    thinned,
+)
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
 
@@ -96,3 +104,12 @@ def test_null_pairs_are_counted_on_a_page_of_their_own(tmp_path: Path, monkeypat
     lines = list(check_relations(tmp_path / "results", tmp_path / "none", [folder], ["arm"], NULL_PAIRS))
     assert "2 answers, a change is named in 1 (95 % interval 9.45 to 90.5 %)" in lines[-2]
     assert [path.name for path in (tmp_path / "results").glob("*.md")] == ["null-pairs.md"]
+
+
+def test_parts_are_cut_from_the_whole(recording: Recording) -> None:
+    parts = dict(parts_of(recording))
+    rows = {name: sum(run.samples for run in each.runs) for name, each in parts.items()}
+    assert rows["half 1"] == rows["half 2"] == rows["whole"] // 2
+    assert rows["every row in 3"] == pytest.approx(rows["whole"] / 3, abs=len(recording.runs))
+    assert "first 12 s" not in parts
+    assert all(run.time[-1] - run.time[0] <= 4.0 for run in parts["first 4 s"].runs)

@@ -12,11 +12,12 @@ for this mistake.
 """
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from joblib import Parallel, delayed
 from scipy.stats import t as student
 
 from armlab.common.errors import DataError, InputError
@@ -24,7 +25,7 @@ from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.diagnosis.torque.rows.simulation import read_simulation
 from armlab.proof.open.likeness.real_arms import RealFolder
-from armlab.proof.open.relations.variants import half
+from armlab.proof.open.relations.variants import WHOLE, half, parts_of
 from armlab.recordings.identifiable import reason_not_identifiable
 from armlab.recordings.load import load_recording
 from armlab.recordings.motion import is_motion_only
@@ -61,6 +62,7 @@ class ArmVerdict:
     """An arm judged without itself. nearest: its best wrong reading; bound: learnt on the others.
 
     named, named_without: mistakes that its recordings are said to have with the bound of all arms, and with this one.
+    parts: of its recordings, the whole ones too (`parts_of`); in_parts: mistakes that are said of them, with this one.
     """
 
     arm: str
@@ -69,6 +71,8 @@ class ArmVerdict:
     bound: float
     named: tuple[str, ...]
     named_without: tuple[str, ...]
+    parts: int
+    in_parts: tuple[str, ...]
 
 
 def best_wrong_readings(folders: Sequence[RealFolder], tuning: ReadingTuning) -> Iterator[WrongReading]:
@@ -130,23 +134,39 @@ def bound_of(readings: Sequence[WrongReading]) -> float:
     return round(mean + float(student.ppf(1 - CHANCE, count - 1)) * deviation, DIGITS)
 
 
-def leave_each_arm_out(readings: Sequence[WrongReading], tuning: ReadingTuning) -> Iterator[ArmVerdict]:
-    """The verdict of each arm with the bound of all, and with that of the other arms."""
+def leave_each_arm_out(
+    readings: Sequence[WrongReading], tuning: ReadingTuning, jobs: int, progress: Callable[[str], None]
+) -> Iterator[ArmVerdict]:
+    """The verdict of each arm with the bound of all, and with that of the other arms, also on parts of recordings."""
     bound = bound_of(readings)
     for arm in sorted({each.folder.arm for each in readings}):
+        progress(f"reading {arm} without itself")
         own = [each for each in readings if each.folder.arm == arm]
         folders = list({each.folder.name: each.folder for each in own}.values())
         without = bound_of([each for each in readings if each.folder.arm != arm])
-        named = [tuple(_named(folders, replace(tuning, least_evidence=each))) for each in (bound, without)]
-        licensed = all(each.folder.licensed for each in own)
-        yield ArmVerdict(arm, licensed, max(own, key=lambda each: each.evidence), without, named[0], named[1])
+        known, fewer = (replace(tuning, least_evidence=each) for each in (bound, without))
+        named = [name for folder in folders for name in _named(load_recording(folder.path), folder.name, known)]
+        jobs_of = (delayed(_named_in_parts)(folder, fewer) for folder in folders)
+        read = dict(part for parts in Parallel(n_jobs=jobs)(jobs_of) for part in parts.items())
+        whole = [name for (_, part), names in read.items() if part == WHOLE for name in names]
+        cut = [f"{name} ({part})" for (_, part), names in read.items() if part != WHOLE for name in names]
+        licensed, nearest = all(each.folder.licensed for each in own), max(own, key=lambda each: each.evidence)
+        yield ArmVerdict(arm, licensed, nearest, without, tuple(named), tuple(whole), len(read), (*whole, *cut))
 
 
-def _named(folders: Sequence[RealFolder], tuning: ReadingTuning) -> Iterator[str]:
-    for folder in folders:
-        recording = load_recording(folder.path)
-        answer = read_rightly(recording, read_simulation(recording, None).inertial, tuning)
-        yield from (f"{folder.name}: {finding.mistake.label}" for finding in answer.mistakes)
+def _named(recording: Recording, name: str, tuning: ReadingTuning) -> tuple[str, ...]:
+    answer = read_rightly(recording, read_simulation(recording, None).inertial, tuning)
+    return tuple(f"{name}: {finding.mistake.label}" for finding in answer.mistakes)
+
+
+def _named_in_parts(folder: RealFolder, tuning: ReadingTuning) -> dict[tuple[str, str], tuple[str, ...]]:
+    """Mistakes that are said of each part of a recording that can be identified, by its name and the part's."""
+    parts = parts_of(load_recording(folder.path))
+    return {
+        (folder.name, part): _named(each, folder.name, tuning)
+        for part, each in parts
+        if not reason_not_identifiable(each)
+    }
 
 
 def share_told(readings: Sequence[WrongReading], bound: float) -> tuple[int, int]:
@@ -155,12 +175,18 @@ def share_told(readings: Sequence[WrongReading], bound: float) -> tuple[int, int
     return sum(value >= bound for value in evidence), len(evidence)
 
 
+def count_parts(verdicts: Sequence[ArmVerdict]) -> tuple[int, int]:
+    """Parts of recordings, and mistakes that are said of them."""
+    return sum(each.parts for each in verdicts), sum(len(each.in_parts) for each in verdicts)
+
+
 def bound_lines(verdicts: Sequence[ArmVerdict], bound: float) -> list[str]:
     """An arm a line: its best wrong reading, and what is said with the bound of all arms and that of the others."""
     return [
         f"{each.arm}: best wrong reading {each.nearest.name} ({each.nearest.folder.name}), evidence "
         f"{each.nearest.evidence:.2f} of {bound:.2f}, of {each.bound:.2f} without this arm; "
-        f"said {', '.join(each.named) or 'nothing'}, without this arm {', '.join(each.named_without) or 'nothing'}"
+        f"said {', '.join(each.named) or 'nothing'}, without this arm {', '.join(each.named_without) or 'nothing'}; "
+        f"of {each.parts} parts: {', '.join(each.in_parts) or 'nothing'}"
         for each in verdicts
     ]
 
@@ -178,14 +204,27 @@ def write_bound(readings: Sequence[WrongReading], verdicts: Sequence[ArmVerdict]
         "bound": bound,
     }
     hidden = sum(not each.licensed for each in verdicts)
+    parts, false = count_parts(verdicts)
     page = markdown_page(
         "What a reading mistake has to explain",
         f"From {len(readings)} recordings and halves of {len(verdicts)} real arms, read rightly: the best wrong "
         f"reading of one more arm explains more than {bound:.2f} nats with a probability of {CHANCE:.0%}. Of {count} "
         f"mistakes that can be seen, were they there, {told} explain as much.",
-        f"Each arm with the bound that the others make, all but {hidden} whose recordings have no licence:",
+        f"Each arm with the bound that the others make: {false} mistakes are said of {parts} parts "
+        "of recordings (wholes, ends, halves, stretches, fewer rows), none of which is known to be read wrongly.",
+        f"All arms but {hidden} whose recordings have no licence:",
         markdown_table(
-            ("arm", "best wrong reading", "evidence", "bound without it", "share", "said", "said without it"),
+            (
+                "arm",
+                "best wrong reading",
+                "evidence",
+                "bound without it",
+                "share",
+                "said",
+                "said without it",
+                "parts",
+                "said of parts without it",
+            ),
             [
                 (
                     each.arm,
@@ -195,11 +234,13 @@ def write_bound(readings: Sequence[WrongReading], verdicts: Sequence[ArmVerdict]
                     f"{each.nearest.evidence / each.bound:.2f}",
                     ", ".join(each.named) or "nothing",
                     ", ".join(each.named_without) or "nothing",
+                    each.parts,
+                    ", ".join(each.in_parts) or "nothing",
                 )
                 for each in verdicts
                 if each.licensed
             ],
-            numbers=(2, 3, 4),
+            numbers=(2, 3, 4, 7),
         ),
     )
     return write_texts({BOUND_FILE: json.dumps(content, indent=1) + "\n", PAGE_FILE: page}, out)

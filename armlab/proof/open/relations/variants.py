@@ -1,5 +1,6 @@
 """The same recording in another form: thinned, resampled, cut, with another clock and other names, or a law added."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,8 @@ RESAMPLED_RATE = 0.9  # of the rate
 NOISE = 1e-9  # of a signal's own unit
 FEWER_SHARE = 0.6  # of the time of each run
 CLOCK_SHIFT_S = 1234.5
+WHOLE = "whole"
+FIRST_S, LAST_S, STRETCH_S, ROW_STEPS = (4.0, 6.0, 12.0), 6.0, 3.0, (2, 3, 5)  # what is cut from a recording
 ADDED_SHARE = 0.3  # of the root mean square of the torque
 
 
@@ -64,6 +67,36 @@ def half(recording: Recording, part: int) -> Recording:
     halves = [(run, part * (run.samples // 2)) for run in recording.runs]
     kept = [run.rows(slice(start, start + run.samples // 2)) for run, start in halves]
     return with_runs(recording, [replace(run, part=part + 1) for run in kept])
+
+
+def ends(recording: Recording, seconds: float, last: bool = False) -> Recording:
+    """The first seconds of each run, or the last ones."""
+    out = []
+    for run in recording.runs:
+        since = run.time[-1] - run.time if last else run.time - run.time[0]
+        out.append(run.rows(since <= seconds))
+    return with_runs(recording, out)
+
+
+def every_row(recording: Recording, step: int) -> Recording:
+    """One of some rows, as a slower logger has them."""
+    return with_runs(recording, [run.rows(slice(None, None, step)) for run in recording.runs])
+
+
+def parts_of(recording: Recording) -> Iterator[tuple[str, Recording]]:
+    """The whole recording, and what is cut from it with a name for each: ends, halves, stretches and fewer rows.
+
+    What is as long as the whole, or holds no row, is left out.
+    """
+    yield WHOLE, recording
+    cut = {f"first {seconds:g} s": ends(recording, seconds) for seconds in FIRST_S}
+    cut |= {f"last {LAST_S:g} s": ends(recording, LAST_S, last=True)}
+    cut |= {f"half {part + 1}": half(recording, part) for part in range(2)}
+    for first, name in enumerate(("even", "odd")):
+        cut[f"{name} {STRETCH_S:g} s"] = every_other_second(recording, first, STRETCH_S)
+    cut |= {f"every row in {step}": every_row(recording, step) for step in ROW_STEPS}
+    rows = sum(run.samples for run in recording.runs)
+    yield from ((name, each) for name, each in cut.items() if 0 < sum(run.samples for run in each.runs) < rows)
 
 
 def one_run(recording: Recording, run: Run) -> Recording:
