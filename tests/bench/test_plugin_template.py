@@ -53,13 +53,17 @@ def test_its_inherited_tests_pass(run: Run) -> None:
     assert tested.returncode == 0, tested.stdout
 
 
-def test_its_comparison_runs_and_its_algorithm_beats_random_search_on_its_problem(run: Run, plugin: Path) -> None:
+def test_its_algorithm_beats_random_search_and_a_change_of_its_problem_is_another_trial(run: Run, plugin: Path) -> None:
     done = run("armlab.cli.main", "run", "comparison.yaml", "--workers", "1")
     assert done.returncode == 0, done.stderr
     table = pd.read_csv(plugin / "results" / "comparison.csv").set_index(["problem", "algorithm"])
     medians = table["median"]
     assert len(table) == 24
     assert medians["reaching", "evolution-strategy"] < medians["reaching", "random-search"]
+    assert "240 trials, 240 done" in run("armlab.cli.main", "run", "comparison.yaml", "--dry-run").stdout
+    source = plugin.parent / "installed" / "armlab_example" / "reaching.py"
+    source.write_text(source.read_text(encoding="utf-8").replace("10.0 *", "20.0 *"), encoding="utf-8")
+    assert "240 trials, 80 done" in run("armlab.cli.main", "run", "comparison.yaml", "--dry-run").stdout
 
 
 def test_a_wrong_key_of_its_problem_is_refused_in_one_line(run: Run, plugin: Path) -> None:
@@ -68,11 +72,3 @@ def test_a_wrong_key_of_its_problem_is_refused_in_one_line(run: Run, plugin: Pat
     refused = run("armlab.cli.main", "run", "wrong.yaml")
     assert refused.returncode == 2
     assert refused.stderr.strip() == ("armlab: unknown key 'joint' in problem of wrong.yaml: did you mean 'joints'?")
-
-
-def test_a_change_of_its_problem_is_another_trial(run: Run, plugin: Path) -> None:
-    run("armlab.cli.main", "run", "comparison.yaml", "--workers", "1")
-    assert "240 trials, 240 done" in run("armlab.cli.main", "run", "comparison.yaml", "--dry-run").stdout
-    source = plugin.parent / "installed" / "armlab_example" / "reaching.py"
-    source.write_text(source.read_text(encoding="utf-8").replace("10.0 *", "20.0 *"), encoding="utf-8")
-    assert "240 trials, 80 done" in run("armlab.cli.main", "run", "comparison.yaml", "--dry-run").stdout
