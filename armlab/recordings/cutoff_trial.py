@@ -18,7 +18,13 @@ from armlab.common.arrays import Array
 from armlab.common.errors import DataError
 from armlab.recordings.cutoff import MAX_CUTOFF_SHARE, MIN_CUTOFF_PERIODS, ROWS_PER_CUTOFF, travel_bandwidth
 from armlab.recordings.differentiate import resample_evenly
-from armlab.recordings.plain_least_squares import PlainLayout, TrimmedButterworth, smooth_motion, weighted_solution
+from armlab.recordings.plain_least_squares import (
+    NormalEquations,
+    PlainLayout,
+    TrimmedButterworth,
+    smooth_motion,
+    sum_equations,
+)
 from armlab.recordings.recording import Run
 from problem.arm import Arm
 from problem.motion import Motion
@@ -129,8 +135,10 @@ def _plain_scores(arm: Arm, held_out: HeldOutBlocks, cutoff_hz: float) -> Array:
     matrix = np.concatenate([layout.matrix(_part(motion, part)) for *_, motion, part in together])
     torque = np.concatenate([low_pass.smooth(run.torque)[part] for run, _, low_pass, _, part in together])
     block = np.concatenate([block[part] for _, block, *_, part in together])
+    sums = {number: NormalEquations.of(matrix[block == number], torque[block == number]) for number in np.unique(block)}
     fitted = {
-        number: weighted_solution(matrix[block != number], torque[block != number])[0] for number in held_out.numbers
+        left_out: sum_equations([each for number, each in sums.items() if number != left_out]).solve()[0]
+        for left_out in held_out.numbers
     }
     return held_out.scores(lambda number, place, part: layout.matrix(_part(motions[place], part)) @ fitted[number])
 

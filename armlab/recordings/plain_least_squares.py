@@ -30,6 +30,7 @@ from problem.regressor import observation_matrix
 COULOMB_WIDTH = 0.01  # of the top speed: where tanh has taken the place of the jump of a sign
 MIN_EXCITATION = 1e-6  # of the largest eigenvalue of the scaled normal matrix: directions below it stay zero
 WEIGHT_ROUNDS = 3
+ROUNDING = 1e-14  # of the squared torque: a residual below it is one of the sums
 COMPARED_HZ = 5.0  # low-pass of recordings that are compared: above the motions of arms, below most of their rest
 BLOCKS = 30  # of time, of a recording, whose scatter says how sure a parameter is
 BOOTSTRAP_DRAWS = 200
@@ -162,9 +163,7 @@ def fit_plain_rows(arm: Arm, rows: Sequence[PlainRows], cutoff_hz: float) -> Pla
         raise DataError(f"no run is longer than {2 * TRIMMED_PERIODS} periods of {cutoff_hz:g} Hz")
     top_speed = np.max([np.abs(each.motion.velocity).max(axis=0) for each in prepared], axis=0)
     layout = PlainLayout(arm, tuple(range(len(arm))), top_speed)
-    matrix = np.concatenate([layout.matrix(each.motion) for each in prepared])
-    values, _ = weighted_solution(matrix, np.concatenate([each.torque for each in prepared]))
-    return PlainModel(layout, cutoff_hz, values)
+    return PlainModel(layout, cutoff_hz, layout.equations(prepared).solve()[0])
 
 
 def fit_plain_recording(folder: Path, cutoff_hz: float | None = None) -> PlainFit:
@@ -199,8 +198,7 @@ def fit_plain(
         raise DataError(f"no run that {missing} is longer than {2 * TRIMMED_PERIODS} periods of {cutoff:g} Hz")
     top_speed = np.max([np.abs(each.motion.velocity).max(axis=0) for each in prepared], axis=0)
     layout = PlainLayout(arm, joints, top_speed)
-    matrix = np.concatenate([layout.matrix(each.motion) for each in fitted])
-    values, _ = weighted_solution(matrix, np.concatenate([each.torque for each in fitted]))
+    values, _ = layout.equations(fitted).solve()
     left = [HeldOutRows(each, each.torque - layout.matrix(each.motion) @ values) for each in held_out]
     return PlainFit(joints, cutoff, top_speed, layout.names, values, tuple(left))
 
@@ -272,18 +270,16 @@ def compare_plain(
 
 def _fit_with_error(layout: "PlainLayout", rows: Sequence[PlainRows]) -> tuple[Array, Array]:
     """Parameters of a recording and their standard errors, (columns,) each."""
-    matrices, torques = [layout.matrix(each.motion) for each in rows], [each.torque for each in rows]
-    values, weights = weighted_solution(np.concatenate(matrices), np.concatenate(torques))
-    grams, rights = [], []
-    count = max(BLOCKS // len(rows), 1)
-    for matrix, torque in zip(matrices, torques, strict=True):
-        for block in np.array_split(np.arange(len(torque)), count):
-            weighted = matrix[block] * weights[:, None]
-            grams.append(np.tensordot(matrix[block], weighted, axes=((0, 1), (0, 1))))
-            rights.append(np.tensordot(weighted, torque[block], axes=((0, 1), (0, 1))))
-    draws = np.random.default_rng(0).integers(len(grams), size=(BOOTSTRAP_DRAWS, len(grams)))
-    stacked = np.array(grams), np.array(rights)
-    drawn = [_solve_excited(stacked[0][each].sum(axis=0), stacked[1][each].sum(axis=0)) for each in draws]
+    parts, count = [], max(BLOCKS // len(rows), 1)
+    for each in rows:
+        matrix = layout.matrix(each.motion)
+        for block in np.array_split(np.arange(len(matrix)), count):
+            parts.append(NormalEquations.of(matrix[block], each.torque[block]))
+    values, weights = sum_equations(parts).solve()
+    draws = np.random.default_rng(0).integers(len(parts), size=(BOOTSTRAP_DRAWS, len(parts)))
+    grams = np.array([np.tensordot(weights, each.gram, axes=1) for each in parts])
+    rights = np.array([weights @ each.right for each in parts])
+    drawn = [_solve_excited(grams[each].sum(axis=0), rights[each].sum(axis=0)) for each in draws]
     return values, np.std(drawn, axis=0)
 
 
@@ -320,6 +316,10 @@ class PlainLayout:
         """The columns in a motion of the joints with torque, (samples, joints, columns), N m (N) per unit."""
         width = COULOMB_WIDTH * np.where(self.top_speed > 0, self.top_speed, 1.0)
         return self._all(motion, width)[:, :, self.columns]
+
+    def equations(self, rows: Sequence[PlainRows]) -> "NormalEquations":
+        """Of all rows of some runs."""
+        return sum_equations([NormalEquations.of(self.matrix(each.motion), each.torque) for each in rows])
 
     def _all(self, motion: Motion, coulomb_width: Array) -> Array:
         """Columns of all links, then JOINT_COLUMNS. coulomb_width: (joints,), rad/s (m/s)."""
@@ -385,18 +385,47 @@ def smooth_motion(even: Run, low_pass: TrimmedButterworth) -> Motion:
     return Motion(position, velocity, np.gradient(velocity, 1 / even.rate_hz, axis=0))
 
 
-def weighted_solution(matrix: Array, torque: Array) -> tuple[Array, Array]:
-    """Least squares with joints weighted by their own residuals, and the weights (joints,).
+@dataclass(frozen=True, eq=False)
+class NormalEquations:
+    """What least squares needs of some rows, joint by joint; those of two sets of rows are added by `sum_equations`.
 
-    matrix: (samples, joints, columns).
+    gram: (joints, columns, columns), right: (joints, columns), products of the columns and the torque. power, rows:
+    (joints,) and a number, squared torque in sum and its rows.
     """
-    weights = np.ones(torque.shape[1])
-    for _ in range(WEIGHT_ROUNDS):
-        weighted = matrix * weights[:, None]
-        gram = np.tensordot(matrix, weighted, axes=((0, 1), (0, 1)))
-        values = _solve_excited(gram, np.tensordot(weighted, torque, axes=((0, 1), (0, 1))))
-        weights = 1 / np.maximum(np.mean((torque - matrix @ values) ** 2, axis=0), 1e-18)
-    return values, weights
+
+    gram: Array
+    right: Array
+    power: Array
+    rows: int
+
+    @classmethod
+    def of(cls, matrix: Array, torque: Array) -> "NormalEquations":
+        """Of columns (samples, joints, columns) and a torque (samples, joints)."""
+        own = [np.ascontiguousarray(matrix[:, joint]) for joint in range(matrix.shape[1])]
+        gram = np.array([each.T @ each for each in own])
+        right = np.array([each.T @ torque[:, joint] for joint, each in enumerate(own)])
+        return cls(gram, right, np.sum(torque**2, axis=0), len(torque))
+
+    def solve(self) -> tuple[Array, Array]:
+        """Least squares with joints weighted by their own residuals, and the weights (joints,)."""
+        weights = np.ones(len(self.power))
+        for _ in range(WEIGHT_ROUNDS):
+            values = self.solve_with(weights)
+            left = self.power - 2 * self.right @ values + self.gram @ values @ values
+            weights = self.rows / np.maximum(left, np.maximum(ROUNDING * self.power, 1e-18))
+        return values, weights
+
+    def solve_with(self, weights: Array) -> Array:
+        """Least squares with given weights of the joints (joints,)."""
+        return _solve_excited(np.tensordot(weights, self.gram, axes=1), weights @ self.right)
+
+
+def sum_equations(parts: Sequence[NormalEquations]) -> NormalEquations:
+    """Of the rows of all parts together."""
+    gram, right, power = (
+        np.sum([getattr(each, name) for each in parts], axis=0) for name in ("gram", "right", "power")
+    )
+    return NormalEquations(gram, right, power, sum(each.rows for each in parts))
 
 
 def _solve_excited(gram: Array, right: Array) -> Array:

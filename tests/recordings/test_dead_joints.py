@@ -16,7 +16,7 @@ from armlab.cli.main import main
 from armlab.identification.identifier import Identifier
 from armlab.recordings.load import load_recording
 from armlab.recordings.motion import load_motion_recording
-from armlab.recordings.plain_least_squares import PlainLayout, fit_plain_rows, prepare_rows, weighted_solution
+from armlab.recordings.plain_least_squares import NormalEquations, PlainLayout, fit_plain_rows, prepare_rows
 from problem.motion import Motion
 from problem.regressor import gram_matrix, observation_matrix, rigid_body_torque
 from problem.robot_file import load_arm
@@ -67,7 +67,7 @@ def test_plain_least_squares_is_that_of_the_other_rows(tmp_path: Path) -> None:
     rows = prepare_rows(whole.runs[0], 5.0)
     layout = PlainLayout(whole.arm, (0, 1, 2), np.abs(rows.motion.velocity).max(axis=0))
     kept = [0, 2]
-    values, _ = weighted_solution(layout.matrix(rows.motion)[:, kept], rows.torque[:, kept])
+    values, _ = NormalEquations.of(layout.matrix(rows.motion)[:, kept], rows.torque[:, kept]).solve()
     expected = (layout.matrix(rows.motion) @ values)[:, kept]
     found = fit_plain_rows(part.arm, [prepare_rows(part.runs[0], 5.0)], 5.0)
     predicted = (found.layout.matrix(rows.motion) @ found.values)[:, kept]

@@ -6,7 +6,7 @@ jumps is made of all samples and passes the filter of the torque.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import combinations, islice
 
 import numpy as np
@@ -108,12 +108,17 @@ class WholeRuns:
         rate, out = self.observed.signals[0].run.rate_hz, []
         fastest = min(tuning.fastest_swing_hz, tuning.max_swing_share * rate)
         for frequency in np.geomspace(fastest / tuning.swing_range, fastest, tuning.swings):
-            turn = 2 * rate * np.tan(np.pi * frequency / rate)  # the bilinear transform moves it to the frequency
-            spring = [1, 2 * tuning.swing_damping * turn, turn**2]
-            for driven in ([turn**2], [turn, 0]):
-                taps = bilinear(driven, spring, rate)
+            for taps in _spring_taps(float(frequency), tuning.swing_damping, rate):
                 out.append(np.concatenate([lfilter(*taps, part - part[0]) for part in self.split(drive)]))
         return np.column_stack(out)
+
+
+@lru_cache(maxsize=64)
+def _spring_taps(frequency: float, damping: float, rate: float) -> tuple[tuple[Array, Array], ...]:
+    """Taps of the deflection and of the speed of a driven spring, by the bilinear transform, right at its frequency."""
+    turn = 2 * rate * np.tan(np.pi * frequency / rate)
+    spring = [1, 2 * damping * turn, turn**2]
+    return tuple(bilinear(driven, spring, rate) for driven in ([turn**2], [turn, 0]))
 
 
 def whole_runs(observed: Observed) -> WholeRuns:
