@@ -13,7 +13,7 @@ from armlab.effects.contract import UNKNOWN, Candidate
 from armlab.effects.parameters import ParameterValue
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.reading.answer import Answer
-from armlab.recordings.recording import Finding, Recording
+from armlab.recordings.recording import Finding, Recording, Role
 
 
 @dataclass(frozen=True)
@@ -246,7 +246,8 @@ class Diagnosis:
     many candidates and shapes were compared. signs: warnings about limits, names, clock and standstill of the recording
     as it is. setup: how it is to be read, None where that was not asked; `recording` is then as it should be read.
     weighed: the names of each finding, and of what was not probable enough for one. reason: why no model was fitted,
-    empty where one was. unnamed: the joint that is predicted much better without any finding.
+    empty where one was. unnamed: the joint that is predicted much better without any finding. left: share of the torque
+    of each role that the model leaves behind the low-pass of plain least squares, geometric mean over the joints.
     """
 
     recording: Recording
@@ -278,4 +279,5 @@ class Diagnosis:
     setup_seconds: float = 0.0
     weighed: tuple[Weighed, ...] = ()
     unnamed: JointFit | None = None
+    left: Mapping[Role, float] = field(default_factory=dict)
     settings: dict[str, float | str | bool] = field(default_factory=dict)

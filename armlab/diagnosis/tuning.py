@@ -197,13 +197,6 @@ class PredictionTuning:
     """The model that predicts: its cut-off, and what it holds beside the named effects."""
 
     folds: int = tuned(6, "blocks of time of the identification runs, held out in turn", "blocks", least=2)
-    cutoff_shares: tuple[float, ...] = tuned(
-        (0.5, 0.7),
-        "lower cut-offs that are tried, as `identify` tries them",
-        "of the cut-off that the positions suggest",
-        least=0.01,
-    )
-    least_change: float = tuned(0.8, "higher cut-offs are not tried", "of the present cut-off", most=1.0)
     min_trial_gain: float = tuned(
         0.02,
         "a lower cut-off, or links near a robot file, have to lower the error by more",
@@ -227,12 +220,6 @@ class PredictionTuning:
         "a change has to lower the errors by more",
         "standard errors between blocks",
         source="one is the rule of Breiman and others 1984 for one choice; two, after looks at the public arms",
-    )
-    smoothing_shares: tuple[float, ...] = tuned(
-        (0.35, 0.5, 0.7, 1.0, 1.4, 2.0),
-        "cut-offs of the positions that are tried for predictions",
-        "of the cut-off that the positions suggest",
-        least=0.01,
     )
     max_follow_rounds: int = tuned(
         8, "fits with columns that follow the model, before it counts as one that does not settle", "fits"

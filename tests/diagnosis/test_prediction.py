@@ -19,9 +19,10 @@ from armlab.diagnosis.torque.predict.prediction import (
     choose_smoothing,
     filtered_residual,
     fit_prediction,
-    identification_runs,
     recorded_residual,
 )
+from armlab.diagnosis.torque.predict.yardstick import fit_yardstick
+from armlab.diagnosis.torque.rows.data import identification_runs
 from armlab.diagnosis.torque.rows.noise import Noise, choose_noise
 from armlab.diagnosis.torque.search.fitted_model import (
     FittedModel,
@@ -114,14 +115,14 @@ def test_the_runs_that_identify_are_cut_to_their_kept_rows(found: Diagnosis) -> 
 def test_positions_are_smoothed_as_predicts_best(found: Diagnosis) -> None:
     observed, model = found.observed, model_found(found)
     assert observed is not None
-    tuning = Settings().tuning.prediction
     rows = observed.of_role("identify")
 
     def error(factor: float) -> float:
         left = recorded_residual(replace(model, position_factor=factor), observed)
         return float(sum(np.sum(left[each.start : each.stop] ** 2) for each in rows))
 
-    chosen = choose_smoothing(replace(model, position_factor=50.0), observed, tuning)
+    plain = fit_yardstick(found.recording.arm, observed)
+    chosen = choose_smoothing(replace(model, position_factor=50.0), plain, observed)
     assert chosen.position_factor != 50.0
     assert error(chosen.position_factor) <= min(error(factor * chosen.position_factor) for factor in (0.1, 10.0))
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from armlab.diagnosis.settings import Settings
-from armlab.diagnosis.torque.predict.prediction import filtered_residual, identification_runs
+from armlab.diagnosis.torque.predict.prediction import filtered_residual
 from armlab.diagnosis.torque.predict.yardstick import (
     Yardstick,
     fit_yardstick,
@@ -15,7 +15,7 @@ from armlab.diagnosis.torque.predict.yardstick import (
     squared_errors,
     with_claims,
 )
-from armlab.diagnosis.torque.rows.data import in_fixed_order, observe
+from armlab.diagnosis.torque.rows.data import identification_runs, in_fixed_order, observe
 from armlab.diagnosis.torque.rows.simulation import read_simulation
 from armlab.recordings.plain_least_squares import PlainLayout, PlainModel
 from armlab.recordings.recording import Recording, Run

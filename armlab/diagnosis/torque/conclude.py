@@ -33,18 +33,16 @@ from armlab.diagnosis.torque.predict.prediction import (
     Prediction,
     choose_smoothing,
     filtered_residual,
-    identification_runs,
     with_smoothing_of,
     with_usual,
 )
 from armlab.diagnosis.torque.predict.yardstick import (
     Yardstick,
-    fit_yardstick,
     predicts_better,
     squared_errors,
     with_claims,
 )
-from armlab.diagnosis.torque.rows.data import Observed
+from armlab.diagnosis.torque.rows.data import Observed, identification_runs, rows_in
 from armlab.diagnosis.torque.search.fitted_model import (
     FittedModel,
     inertial_parameters,
@@ -53,7 +51,9 @@ from armlab.diagnosis.torque.search.search import Search
 from armlab.diagnosis.torque.search.surrogate import Structure
 from armlab.diagnosis.tuning import PruningTuning, changed_numbers
 from armlab.identification.torque_model import TorqueModel
-from armlab.recordings.recording import Recording
+from armlab.recordings.recording import ROLES, Recording, Role
+
+SMALLEST_SHARE = 1e-6  # of the torque
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,11 +150,10 @@ def _assemble(
         "unknown": [each.equation for each in claims if each.candidate is None],
         "in_links": [f"{each.effect}: {each.equation}" for each in claims if each.in_links],
     }
-    plain = fit_yardstick(simulation.arm, observed)
+    plain = prediction.plain
     is_plain_best = plain is not None and simulation.kind != "simulated" and _is_beaten_by(plain, prediction)
-    found = choose_smoothing(
-        build_model(recording, simulation, prediction.model, named, notes), observed, tuning.prediction
-    )
+    built = build_model(recording, simulation, prediction.model, named, notes)
+    found = choose_smoothing(built, plain, observed)
     if is_plain_best:
         assert plain is not None
         found = _delivered(plain, found, observed, claims)
@@ -205,7 +204,19 @@ def _assemble(
         looks=count_looks(model),
         settings=settings,
         unnamed=unnamed,
+        left=_shares_left(found, prediction.judged),
     )
+
+
+def _shares_left(model: TorqueModel, observed: Observed) -> dict[Role, float]:
+    """What a model leaves of the torque of each role: over its scatter, geometric mean over the joints."""
+    residual, out = filtered_residual(model, observed), {}
+    for role in ROLES:
+        rows = rows_in(observed.of_role(role), observed.rows)
+        spread = np.std(observed.torque[rows], axis=0)
+        left = np.sqrt(np.mean(residual[rows] ** 2, axis=0))[spread > 0] / spread[spread > 0]
+        out[role] = float(np.exp(np.mean(np.log(np.maximum(left, SMALLEST_SHARE)))))
+    return out
 
 
 def _unnamed_gain(fits: Sequence[JointFit], tuning: PruningTuning) -> JointFit | None:
@@ -222,7 +233,9 @@ def _is_beaten_by(plain: Yardstick, prediction: Prediction) -> bool:
     except DataError:
         return False
     return predicts_better(
-        errors, prediction.squared_errors, prediction.model.design.settings.tuning.prediction.min_trial_gain
+        errors.sum(axis=0),
+        prediction.squared_errors.sum(axis=0),
+        prediction.model.design.settings.tuning.prediction.min_trial_gain,
     )
 
 

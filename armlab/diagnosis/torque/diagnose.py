@@ -7,16 +7,13 @@ sentence each; `conclude.py` makes the diagnosis of what is believed in the end.
 import time
 from dataclasses import replace
 
-import numpy as np
-
-from armlab.common.arrays import Array
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.torque.columns.links import link_prior
 from armlab.diagnosis.torque.conclude import conclude
-from armlab.diagnosis.torque.rows.data import Observed, in_fixed_order, observe, rows_in
+from armlab.diagnosis.torque.rows.data import in_fixed_order, observe
 from armlab.diagnosis.torque.rows.simulation import read_simulation, reason_misread
 from armlab.diagnosis.torque.search.fitted_model import (
     FittedModel,
@@ -28,7 +25,7 @@ from armlab.recordings.dead_joints import leave_dead_joints_out
 from armlab.recordings.identifiable import reason_impossible, reason_not_identifiable
 from armlab.recordings.reading.answer import Answer, read_rightly, with_joints_left_out
 from armlab.recordings.reading.tuning import ReadingTuning
-from armlab.recordings.recording import ROLES, Recording, Role
+from armlab.recordings.recording import ROLES, Recording
 from problem.base_parameters import base_parameters
 from problem.pseudo_inertia import are_bodies
 
@@ -75,10 +72,9 @@ def diagnose(
 
 def _only_if_explained(found: Diagnosis, setup: Answer | None, tuning: ReadingTuning) -> Diagnosis:
     """The diagnosis, or an inconclusive one where neither a reading nor physics explains the torque."""
-    observed, final = found.observed, found.final
-    if observed is None or final is None or not found.fit or found.simulation.kind == "simulated":
+    if not found.left or found.simulation.kind == "simulated":
         return found
-    fitted, share = (_share_left(observed, final, role) for role in ROLES)
+    fitted, share = (found.left[role] for role in ROLES)
     if share <= tuning.max_unexplained:
         return found
     tried = f", however it is read ({setup.looks} readings were tried)" if setup is not None and setup.looks > 1 else ""
@@ -92,18 +88,7 @@ def _only_if_explained(found: Diagnosis, setup: Answer | None, tuning: ReadingTu
             "the motion is too short, or too unlike what was held out, to tell its numbers. Record longer runs in "
             "which all joints move."
         )
-    return Diagnosis(found.recording, found.simulation, "inconclusive", reason, observed)
-
-
-def _share_left(observed: Observed, final: Array, role: Role) -> float:
-    """What a model leaves (rows, joints) of the torque of a role: over its scatter, geometric mean over the joints."""
-    rows = rows_in(observed.of_role(role), observed.rows)
-    spread = np.std(observed.torque[rows], axis=0)
-    left = np.sqrt(np.mean(final[rows] ** 2, axis=0))[spread > 0] / spread[spread > 0]
-    return float(np.exp(np.mean(np.log(np.maximum(left, SMALLEST_SHARE)))))
-
-
-SMALLEST_SHARE = 1e-6  # of the torque
+    return Diagnosis(found.recording, found.simulation, "inconclusive", reason, found.observed)
 
 
 def _reading_alone(

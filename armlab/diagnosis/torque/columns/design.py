@@ -63,13 +63,26 @@ class DesignMatrix:
         """Everything stacked, once."""
         return stack_columns(self.base, self.rigid, self.blocks, self.target)
 
-    def solver(self, noise: Noise) -> tuple[Moments, Solver]:
-        """Moments and solver under a noise model."""
+    def solver(self, noise: Noise, as_large_as_torque: bool = False) -> tuple[Moments, Solver]:
+        """Moments and solver under a noise model.
+
+        as_large_as_torque: a law of which no size is known has a normal prior about zero, with the torque of its joints
+        for standard deviation. Where a joint goes one way only, no data part its Coulomb friction from its offset.
+        """
         found, groups = compute_moments(self.columns, noise, self.observed), self.columns.groups
         scales = [group.candidate.prior_scale(self.simulation.inertial) for group in groups]
+        if as_large_as_torque:
+            scales = [min(pair) for pair in zip(scales, map(self._torque_scale, self.blocks), strict=True)]
         simulated = [self.simulation.coefficients_of(group.candidate) for group in groups]
         tuning = self.settings.tuning.solver
         return found, Solver(found, groups, len(self.base), self.prior, self.places, scales, simulated, tuning)
+
+    def _torque_scale(self, block: Block) -> float:
+        """The coefficient with which a law makes as much torque as its joints have; infinite where it makes none."""
+        if np.isfinite(block.candidate.prior_scale(self.simulation.inertial)) or not block.values.any():
+            return np.inf
+        torque = self.observed.torque[:, list(block.candidate.rows)]
+        return float(np.sqrt(np.mean(torque**2) / np.mean(block.values**2)))
 
     def block(self, candidate: Candidate, variant: int) -> Block:
         """A candidate's filtered columns."""

@@ -8,12 +8,11 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.result import HeldOutErrors, JointFit
 from armlab.diagnosis.torque.predict.prediction import (
     filtered_residual,
-    identification_runs,
     recorded_residual,
     with_smoothing_of,
 )
 from armlab.diagnosis.torque.predict.yardstick import Yardstick
-from armlab.diagnosis.torque.rows.data import Observed, rows_in
+from armlab.diagnosis.torque.rows.data import Observed, identification_runs, rows_in
 from armlab.diagnosis.tuning import Tuning
 from armlab.identification.identifier import Identifier
 from armlab.identification.torque_model import TorqueModel
@@ -31,10 +30,10 @@ def joint_fits(
     and that of the named effects alone; floor: (joints,), N m (N).
     """
     found, alone = models
-    runs = identification_runs(observed)
-    rigid = with_smoothing_of(found, Identifier(found.arm, ()).fit(runs).model_)
-    identified = with_smoothing_of(
-        found, Identifier(found.arm, cutoff_hz=None if plain is None else plain.cutoff_hz).fit(runs).model_
+    runs, cutoff = identification_runs(observed), None if plain is None else plain.cutoff_hz
+    rigid, identified = (
+        with_smoothing_of(found, Identifier(found.arm, parts, cutoff_hz=cutoff).fit(runs).model_)
+        for parts in ((), None)
     )
     every = (found, alone, identified)
     left = None if plain is None else plain.residual(observed)

@@ -20,6 +20,7 @@ from armlab.diagnosis.torque.columns.columns import Columns
 from armlab.diagnosis.torque.columns.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.torque.columns.links import Widths
 from armlab.diagnosis.torque.columns.solver import State
+from armlab.diagnosis.torque.predict.yardstick import Yardstick, fit_yardstick
 from armlab.diagnosis.torque.rows.data import Observed, observe, rows_in
 from armlab.diagnosis.torque.rows.noise import Noise, fit_noise
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_values, follow_model
@@ -28,16 +29,18 @@ from armlab.diagnosis.torque.search.search import Search, Step
 from armlab.diagnosis.tuning import PredictionTuning
 from armlab.effects.contract import Candidate
 from armlab.effects.friction_curve import FrictionCurve
-from armlab.identification.regression import suggested_cutoff
 from armlab.identification.torque_model import TorqueModel
-from armlab.recordings.recording import Role, Run
+from armlab.recordings.recording import Role
+
+SMOOTHING_STEP = 2**0.5  # from one cut-off of positions that is tried to the next
 
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
     """A model that predicts. places: of its groups, by the number that each has in the model of the names; what is not
     claimed there is present here. held_out: ||tau - tau_hat|| / ||tau|| of the filtered torque on blocks held out in
-    turn; squared_errors: of each joint there, (joints,). judged, block: the rows of that, and the block of each.
+    turn; squared_errors: of each block and joint there, (blocks, joints). judged, block: the rows of that, and the
+    block of each. plain: least squares beside it, None where it could not be fitted.
     """
 
     model: FittedModel
@@ -46,6 +49,7 @@ class Prediction:
     squared_errors: Array
     judged: Observed
     block: NDArray[np.intp]
+    plain: Yardstick | None
 
     def with_names_alone(self, names: Iterable[int]) -> FittedModel:
         """The model fitted with some of its groups alone."""
@@ -63,16 +67,16 @@ def fit_prediction(named: FittedModel) -> Prediction:
     candidates = [*(_of_found_size(named, number) for number in own), *candidates]
     start = tuple(range(len(own)))
     own_design = replace(named.design, blocks=tuple(named.design.blocks[number] for number in numbers))
-    suggested = max(suggested_cutoff(run) for run in identification_runs(named.design.observed))
-    smooth = _design_at(named, candidates, min(suggested, named.design.observed.cutoff_hz), position_ratio=1.0)
+    observed = named.design.observed
+    plain = fit_yardstick(named.design.simulation.arm, observed)
+    cutoff = observed.cutoff_hz if plain is None else min(plain.cutoff_hz, observed.cutoff_hz)
+    smooth = _design_at(named, candidates, cutoff, position_ratio=1.0)
     judge = _Judge.of(smooth if _has_rows(smooth.observed) else own_design)
     best = _improved(_Trial.of(own_design, start, named.state, named.noise, judge), tuning)
-    cutoffs = []
-    for cutoff in _lower_cutoffs(named.design.observed, suggested, tuning):
+    if cutoff < observed.cutoff_hz:
         design = _design_at(named, candidates, cutoff)
         if _has_rows(design.observed):
-            cutoffs.append(_improved(_Trial.of(design, start, named.state, None, judge), tuning))
-    best = _better(best, cutoffs, tuning)
+            best = _better(best, [_improved(_Trial.of(design, start, named.state, None, judge), tuning)], tuning)
     design, noise = best.trial.model.design, best.trial.model.noise
     known = [
         _improved(_Trial.of(design, start, State(named.state.groups, widths), noise, judge), tuning)
@@ -81,8 +85,8 @@ def fit_prediction(named: FittedModel) -> Prediction:
     best = _better(best, known, tuning)
     model = _settled(replace(best.trial.model, state=best.state), tuning)
     places = {group: place for place, group in enumerate(numbers) if place in best.state.groups}
-    squares, judged = best.trial.errors(best.state).sum(axis=0), judge.observed
-    return Prediction(model, places, best.held_out, squares, judged, judge.blocks(judged))
+    squares, judged = best.trial.errors(best.state), judge.observed
+    return Prediction(model, places, best.held_out, squares, judged, judge.blocks(judged), plain)
 
 
 def _may_help(law: Candidate) -> bool:
@@ -137,12 +141,6 @@ def _widths_of_known_links(model: FittedModel) -> list[Widths]:
         return []
     tuning = model.design.settings.tuning.prediction
     return [(width,) * model.design.prior.links for width in tuning.link_widths]
-
-
-def _lower_cutoffs(observed: Observed, suggested: float, tuning: PredictionTuning) -> list[float]:
-    """Cut-offs below the present one, Hz. suggested: by the positions."""
-    present = observed.cutoff_hz
-    return [each * suggested for each in tuning.cutoff_shares if each * suggested < tuning.least_change * present]
 
 
 def _design_at(
@@ -369,7 +367,7 @@ def _is_sure(gains: Array, tuning: PredictionTuning) -> bool:
 
 
 def _fitted(design: DesignMatrix, noise: Noise, widths: tuple[float, ...] | None) -> FittedModel:
-    moments, solver = design.solver(noise)
+    moments, solver = design.solver(noise, as_large_as_torque=True)
     return FittedModel(design, noise, moments, solver, State((), widths))
 
 
@@ -412,28 +410,26 @@ def _targets(rows: WhitenedRows, values: Array) -> WhitenedRows:
     return replace(rows, errors=targets)
 
 
-def identification_runs(observed: Observed) -> list[Run]:
-    """The stretches of the runs that identify, even in time, as runs."""
-    out, start = [], 0
-    for index, each in enumerate(observed.signals):
-        kept = np.arange(each.run.samples)[each.filter.rows]
-        for part in observed.of_role("identify"):
-            if part.run == index:
-                first, last = kept[part.start - start], kept[part.stop - start - 1]
-                out.append(each.run.rows(slice(int(first), int(last) + 1)))
-        start += len(each.torque)
-    return out
+def choose_smoothing(model: TorqueModel, plain: Yardstick | None, observed: Observed) -> TorqueModel:
+    """The model with the cut-off of positions that predicts the torque of the identification runs best, as recorded.
 
-
-def choose_smoothing(model: TorqueModel, observed: Observed, tuning: PredictionTuning) -> TorqueModel:
-    """The model with the cut-off of positions that predicts the torque of the identification runs best, as recorded."""
-    if model.cutoff_hz is None:
+    From the cut-off of plain least squares it goes up, and then down, as long as that helps.
+    """
+    if model.cutoff_hz is None or plain is None:
         return model
-    suggested = max(suggested_cutoff(run) for run in identification_runs(observed))
-    factors = [share * suggested / model.cutoff_hz for share in tuning.smoothing_shares]
     rows = rows_in(observed.of_role("identify"), observed.rows)
-    tried = [replace(model, position_factor=factor) for factor in factors]
-    return min(tried, key=lambda each: float(np.sum(recorded_residual(each, observed)[rows] ** 2)))
+
+    def tried(factor: float) -> tuple[float, TorqueModel]:
+        smoothed = replace(model, position_factor=factor)
+        return float(np.sum(recorded_residual(smoothed, observed)[rows] ** 2)), smoothed
+
+    error, best = tried(plain.cutoff_hz / model.cutoff_hz)
+    for step in (SMOOTHING_STEP, 1 / SMOOTHING_STEP):
+        other, smoothed = tried(best.position_factor * step)
+        while other < error:
+            error, best = other, smoothed
+            other, smoothed = tried(best.position_factor * step)
+    return best
 
 
 def with_smoothing_of(model: TorqueModel, other: TorqueModel) -> TorqueModel:

@@ -13,15 +13,21 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.errors import DataError
-from armlab.diagnosis.torque.predict.prediction import identification_runs
-from armlab.diagnosis.torque.rows.data import Observed, rows_in
+from armlab.diagnosis.torque.rows.data import Observed, identification_runs, rows_in
 from armlab.effects.scene import instants
 from armlab.identification.components import usual_components
 from armlab.identification.estimators.least_squares import least_squares
 from armlab.identification.identifier import Identifier
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.cutoff_trial import choose_cutoff_hz
-from armlab.recordings.plain_least_squares import PlainModel, fit_plain_rows, prepare_rows
+from armlab.recordings.plain_least_squares import (
+    NormalEquations,
+    PlainLayout,
+    PlainModel,
+    fit_plain_rows,
+    prepare_rows,
+    sum_equations,
+)
 from armlab.recordings.recording import Run
 from problem.arm import Arm
 from problem.motion import Motion
@@ -66,25 +72,37 @@ def fit_yardstick(arm: Arm, observed: Observed) -> Yardstick | None:
 
 
 def squared_errors(arm: Arm, observed: Observed, block: NDArray[np.intp], cutoff_hz: float) -> Array:
-    """Of plain least squares on blocks left out in turn, summed over the rows that identify, (joints,).
+    """Of plain least squares on blocks left out in turn, summed over the rows that identify, (blocks, joints).
 
-    observed, block: the rows that judge, and the block of each. Raises ValueError where no rows are left.
+    observed, block: the rows that judge, and the block of each. Raises ValueError where too few rows are left.
     """
     identify = rows_in(observed.of_role("identify"), observed.rows)
-    ends = np.cumsum([0, *(len(each.torque) for each in observed.signals)])
-    prepared = [prepare_rows(each.run, cutoff_hz) for each in observed.signals]
-    own = []  # the block of each row that is fitted, -1 where it does not identify
-    for number, each in enumerate(observed.signals):
-        part = slice(int(ends[number]), int(ends[number + 1]))
-        near = np.clip(np.searchsorted(each.time, prepared[number].time), 0, len(each.time) - 1)
-        own.append(np.where(identify[part][near], block[part][near], -1))
-    errors = np.zeros(observed.joints)
-    for number in np.unique(block[identify]):
-        kept = [rows.where((mine >= 0) & (mine != number)) for rows, mine in zip(prepared, own, strict=True)]
-        model = fit_plain_rows(arm, kept, cutoff_hz)
-        left = Yardstick(model, cutoff_hz).residual(observed)
-        rows = identify & (block == number)
-        errors += np.sum(left[rows] ** 2, axis=0)
+    own_rows = np.split(np.arange(observed.rows), np.cumsum([len(each.torque) for each in observed.signals])[:-1])
+    fitted = []  # of each run its rows, and the block of each, -1 where it does not identify
+    for signals, own in zip(observed.signals, own_rows, strict=True):
+        rows = prepare_rows(signals.run, cutoff_hz)
+        near = own[np.clip(np.searchsorted(signals.time, rows.time), 0, len(own) - 1)]
+        fitted.append((rows, np.where(identify[near], block[near], -1)))
+    numbers, found = np.unique(block[identify]), np.unique(np.concatenate([own for _, own in fitted]))
+    if len(found[found >= 0]) < 2:
+        raise DataError("too few rows to leave blocks out")
+    speeds = [np.abs(rows.motion.velocity[own >= 0]).max(axis=0, initial=0.0) for rows, own in fitted]
+    layout = PlainLayout(arm, tuple(range(len(arm))), np.max(speeds, axis=0))
+    sums: dict[int, list[NormalEquations]] = {number: [] for number in numbers.tolist()}
+    for rows, own in fitted:
+        matrix = layout.matrix(rows.motion)
+        for number in np.unique(own[own >= 0]).tolist():
+            sums[number].append(NormalEquations.of(matrix[own == number], rows.torque[own == number]))
+    values = [
+        sum_equations([each for number in sums if number != left_out for each in sums[number]]).solve()[0]
+        for left_out in sums
+    ]
+    errors = np.zeros((len(numbers), observed.joints))
+    for signals, own in zip(observed.signals, own_rows, strict=True):
+        predicted = PlainModel(layout, cutoff_hz, np.column_stack(values)).predict(signals.run)
+        left = signals.torque[:, :, None] - signals.filter(predicted)
+        for place, number in enumerate(numbers):
+            errors[place] += np.sum(left[identify[own] & (block[own] == number), :, place] ** 2, axis=0)
     return errors
 
 

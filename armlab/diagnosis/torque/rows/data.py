@@ -287,3 +287,16 @@ def _split_runs(signals: Sequence[Signals], blocks: bool, tuning: DataTuning) ->
             out += [Segment(index, role, a, b) for role, (a, b) in zip(roles, pairs, strict=True)]
         start = stop
     return tuple(out)
+
+
+def identification_runs(observed: Observed) -> list[Run]:
+    """The stretches of the runs that identify, even in time, as runs."""
+    out, start = [], 0
+    for index, each in enumerate(observed.signals):
+        kept = np.arange(each.run.samples)[each.filter.rows]
+        for part in observed.of_role("identify"):
+            if part.run == index:
+                first, last = kept[part.start - start], kept[part.stop - start - 1]
+                out.append(each.run.rows(slice(int(first), int(last) + 1)))
+        start += len(each.torque)
+    return out
