@@ -132,7 +132,7 @@ def calibrate_reading(work: Path, out: Path, jobs: int) -> Iterator[str]:
     arms = f"{len(readings)} recordings and halves of {len(verdicts)} arms"
     yield f"{arms}: bound {bound:.3f}; {told} of {count} mistakes reach it"
     parts, false = count_parts(verdicts)
-    yield f"without the arm that is judged: {false} mistakes are said of {parts} parts of recordings"
+    yield f"without the arm that is judged: {false} of {parts} parts of recordings are said to hold mistakes"
     for path in write_bound(readings, verdicts, out):
         yield f"wrote {path}"
 

@@ -62,7 +62,8 @@ class ArmVerdict:
     """An arm judged without itself. nearest: its best wrong reading; bound: learnt on the others.
 
     named, named_without: mistakes that its recordings are said to have with the bound of all arms, and with this one.
-    parts: of its recordings, the whole ones too (`parts_of`); in_parts: mistakes that are said of them, with this one.
+    parts: of its recordings, the whole ones too (`parts_of`); read_wrongly: those that are said to hold mistakes, with
+    this one.
     """
 
     arm: str
@@ -72,7 +73,7 @@ class ArmVerdict:
     named: tuple[str, ...]
     named_without: tuple[str, ...]
     parts: int
-    in_parts: tuple[str, ...]
+    read_wrongly: tuple[str, ...]
 
 
 def best_wrong_readings(folders: Sequence[RealFolder], tuning: ReadingTuning) -> Iterator[WrongReading]:
@@ -149,9 +150,9 @@ def leave_each_arm_out(
         jobs_of = (delayed(_named_in_parts)(folder, fewer) for folder in folders)
         read = dict(part for parts in Parallel(n_jobs=jobs)(jobs_of) for part in parts.items())
         whole = [name for (_, part), names in read.items() if part == WHOLE for name in names]
-        cut = [f"{name} ({part})" for (_, part), names in read.items() if part != WHOLE for name in names]
+        wrong = tuple(f"{', '.join(names)} ({part})" for (_, part), names in read.items() if names)
         licensed, nearest = all(each.folder.licensed for each in own), max(own, key=lambda each: each.evidence)
-        yield ArmVerdict(arm, licensed, nearest, without, tuple(named), tuple(whole), len(read), (*whole, *cut))
+        yield ArmVerdict(arm, licensed, nearest, without, tuple(named), tuple(whole), len(read), wrong)
 
 
 def _named(recording: Recording, name: str, tuning: ReadingTuning) -> tuple[str, ...]:
@@ -176,8 +177,8 @@ def share_told(readings: Sequence[WrongReading], bound: float) -> tuple[int, int
 
 
 def count_parts(verdicts: Sequence[ArmVerdict]) -> tuple[int, int]:
-    """Parts of recordings, and mistakes that are said of them."""
-    return sum(each.parts for each in verdicts), sum(len(each.in_parts) for each in verdicts)
+    """Parts of recordings, and those that are said to hold mistakes."""
+    return sum(each.parts for each in verdicts), sum(len(each.read_wrongly) for each in verdicts)
 
 
 def bound_lines(verdicts: Sequence[ArmVerdict], bound: float) -> list[str]:
@@ -186,7 +187,7 @@ def bound_lines(verdicts: Sequence[ArmVerdict], bound: float) -> list[str]:
         f"{each.arm}: best wrong reading {each.nearest.name} ({each.nearest.folder.name}), evidence "
         f"{each.nearest.evidence:.2f} of {bound:.2f}, of {each.bound:.2f} without this arm; "
         f"said {', '.join(each.named) or 'nothing'}, without this arm {', '.join(each.named_without) or 'nothing'}; "
-        f"of {each.parts} parts: {', '.join(each.in_parts) or 'nothing'}"
+        f"of {each.parts} parts: {'; '.join(each.read_wrongly) or 'nothing'}"
         for each in verdicts
     ]
 
@@ -210,8 +211,8 @@ def write_bound(readings: Sequence[WrongReading], verdicts: Sequence[ArmVerdict]
         f"From {len(readings)} recordings and halves of {len(verdicts)} real arms, read rightly: the best wrong "
         f"reading of one more arm explains more than {bound:.2f} nats with a probability of {CHANCE:.0%}. Of {count} "
         f"mistakes that can be seen, were they there, {told} explain as much.",
-        f"Each arm with the bound that the others make: {false} mistakes are said of {parts} parts "
-        "of recordings (wholes, ends, halves, stretches, fewer rows), none of which is known to be read wrongly.",
+        f"Each arm with the bound that the others make: {false} of {parts} parts of recordings are said to "
+        "hold mistakes (wholes, ends, halves, stretches, fewer rows), none of which is known to be read wrongly.",
         f"All arms but {hidden} whose recordings have no licence:",
         markdown_table(
             (
@@ -235,7 +236,7 @@ def write_bound(readings: Sequence[WrongReading], verdicts: Sequence[ArmVerdict]
                     ", ".join(each.named) or "nothing",
                     ", ".join(each.named_without) or "nothing",
                     each.parts,
-                    ", ".join(each.in_parts) or "nothing",
+                    "; ".join(each.read_wrongly) or "nothing",
                 )
                 for each in verdicts
                 if each.licensed
