@@ -112,6 +112,18 @@ def test_the_runs_that_identify_are_cut_to_their_kept_rows(found: Diagnosis) -> 
     assert all(0 < each.time[0] < 1 and each.role == "identify" for each in runs)
 
 
+def test_a_law_of_unknown_size_is_held_to_the_torque_of_its_joint() -> None:
+    model = first_model(cases.recording(friction_and_trifle))
+    torque = np.sqrt(np.mean(model.design.observed.torque**2, axis=0))
+    moments, held = model.design.solver(model.noise, as_large_as_torque=True)
+    offsets = [each for each in held.groups if each.candidate.effect == "torque_offset"]
+    assert len(offsets) == 3
+    for group in offsets:
+        (column,), joint = group.columns, group.candidate.rows[0]
+        prior = held.precisions[column] - model.solver.precisions[column]
+        assert prior == pytest.approx((torque[joint] * moments.lengths[column]) ** -2, rel=1e-6)
+
+
 def test_positions_are_smoothed_as_predicts_best(found: Diagnosis) -> None:
     observed, model = found.observed, model_found(found)
     assert observed is not None
