@@ -10,9 +10,10 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
 from armlab.common.arrays import Array
+from armlab.common.dahl import dahl_state
 from armlab.effects.coupling import neighbour_pairs
 from armlab.effects.friction import direction_of_motion
-from armlab.effects.memory import HeatedFriction, ThermometerFriction, ViscousDrift, dahl_state
+from armlab.effects.memory import HeatedFriction, ThermometerFriction, ViscousDrift
 
 
 def integrated(time: Array, position: Array, way: float) -> Array:

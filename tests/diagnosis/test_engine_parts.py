@@ -8,6 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from armlab.common.arrays import Array
+from armlab.common.dahl import dahl_state
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.columns.blocks import WhitenedRows, block_covariance, held_out_gain, variance_inflation
 from armlab.diagnosis.torque.columns.design import DesignMatrix, build_design_matrix
@@ -29,7 +30,6 @@ from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_backgro
 from armlab.diagnosis.torque.search.surrogate import Remainder, Structure, fit_surrogate
 from armlab.diagnosis.tuning import Tuning
 from armlab.effects.library import library
-from armlab.effects.memory import dahl_state
 from armlab.recordings.recording import ROLES
 from problem.base_parameters import base_parameters
 

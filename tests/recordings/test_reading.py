@@ -5,12 +5,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import engine_cases as cases
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
 from recording_folders import ARM, POSITION, TORQUE, folder_with, frame, motion_at
 
+from armlab.common.arrays import Array
+from armlab.common.dahl import dahl_state
 from armlab.common.errors import InputError
 from armlab.recordings.check import check_recording
 from armlab.recordings.load import load_recording
@@ -40,6 +43,7 @@ from problem.pseudo_inertia import least_eigenvalues
 from problem.regressor import rigid_body_torque
 
 TUNING = ReadingTuning()
+LATE_S = 0.08
 Change = Callable[[pd.DataFrame], None]
 
 
@@ -548,3 +552,28 @@ def test_a_joint_that_leaves_little_contradicts_another_sign_or_column_of_positi
         Mistake("encoder_offset", 2): set(),
     }
     assert {mistake: set(contradicted_by(mistake)) for mistake in contradicted} == contradicted
+
+
+def presliding(motion: Motion, time: Array) -> Array:
+    """Friction of 10 N m that turns over a fiftieth of each joint's travel."""
+    return np.column_stack([10.0 * dahl_state(each, 0.02 * np.ptp(each)) for each in motion.position.T])
+
+
+def sliding(motion: Motion, time: Array) -> Array:
+    """Friction of 10 N m that turns at once."""
+    return 10.0 * np.sign(motion.velocity)
+
+
+def test_friction_that_turns_over_a_way_is_no_late_torque() -> None:
+    assert answer_to(cases.recording(presliding, seconds=10.0)).mistakes == ()
+
+
+def test_late_torque_is_told_beside_friction_that_turns_at_once() -> None:
+    recording = cases.recording(sliding, seconds=10.0)
+    rows = round(LATE_S * cases.RATE_HZ)
+    runs = tuple(
+        replace(run, torque=np.roll(run.torque, rows, axis=0)).rows(slice(rows, None)) for run in recording.runs
+    )
+    (found,) = answer_to(replace(recording, runs=runs)).mistakes
+    assert found.mistake.effect == "time_delay"
+    assert found.mistake.value("seconds") == pytest.approx(LATE_S, rel=0.2)

@@ -165,6 +165,7 @@ class Fitter:
             reading.clock,
             id(reading.arm.joints),
             reading.arm.gravity,
+            reading.friction_ways,
         )
         if key not in self._columns:
             if len(self._columns) > 24:

@@ -6,7 +6,7 @@ explains by chance (`bound.json`).
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -169,6 +169,17 @@ class ReadingJudge:
         if not others:
             return Trial(reading, None, lambda: strict)
         return Trial(reading, strict, lambda: self._losses(reading, others[0]))
+
+    def lagging(self, reading: Reading) -> Trial:
+        """The reading with friction that turns over a way, of each joint the one with which it fits best.
+
+        Such friction lags behind the motion, as torque does that is read late.
+        """
+        ways = (0.0, *self.tuning.friction_ways)
+        tried = [self.trial(replace(reading, friction_ways=(way,) * reading.joints)) for way in ways]
+        best = np.argmin([each.free if each.near is None else each.near for each in tried], axis=0)
+        mixed = self.trial(replace(reading, friction_ways=tuple(ways[each] for each in best)))
+        return min((*tried, mixed), key=lambda each: each.loss)
 
     def _losses(self, reading: Reading, width: float) -> Array:
         (score,) = self.fitter.scores(reading, (width,))

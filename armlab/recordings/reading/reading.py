@@ -55,7 +55,8 @@ class Reading:
     torque_order: which recorded channel stands at each place. clock: recorded time over true time. delay: (joints,), s,
     by which torque is late. arm, inertial: the robot, and (10 * joints,) of the links of the simulation if there is
     one. mistakes: what was taken back. springs: joints (from 0) that have one beside links and friction.
-    adds_gravity: of the links of the robot file, which the drive took from the torque.
+    adds_gravity: of the links of the robot file, which the drive took from the torque. friction_ways: of each
+    joint, the share of its travel over which friction turns after a reversal; 0 or none: it turns at once.
     """
 
     position: Array
@@ -71,6 +72,7 @@ class Reading:
     mistakes: tuple[Mistake, ...] = ()
     springs: tuple[int, ...] = ()
     adds_gravity: bool = False
+    friction_ways: tuple[float, ...] = ()
 
     @property
     def joints(self) -> int:

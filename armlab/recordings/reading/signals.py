@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
+from armlab.common.dahl import dahl_state
 from armlab.recordings.channels import gravity_torque
 from armlab.recordings.cutoff import MAX_CUTOFF_SHARE, MIN_CUTOFF_PERIODS, travel_bandwidth
 from armlab.recordings.differentiate import Signals, differentiate, resample_evenly
@@ -25,16 +26,16 @@ class Channels:
     """Recorded channels, filtered, before any reading.
 
     motion: (rows, channels) of the positions. stamps: (rows,), s. run: (rows,), the number of the run. torques: of each
-    run all stamps (samples,) and torques (samples, channels). velocities: of each run, all samples (samples, channels),
-    with the filter and the samples that became rows. block: (rows,), the number of the block of time. margin_s: how far
-    torque can be shifted in time.
+    run all stamps (samples,) and torques (samples, channels). paths: of each run, all positions and velocities
+    (samples, channels), with the filter and the samples that became rows. block: (rows,), the number of the block of
+    time. margin_s: how far torque can be shifted in time.
     """
 
     motion: Motion
     stamps: Array
     run: NDArray[np.intp]
     torques: tuple[tuple[Array, Array], ...]
-    velocities: tuple[tuple[Array, Butterworth, NDArray[np.intp]], ...]
+    paths: tuple[tuple[Array, Array, Butterworth, NDArray[np.intp]], ...]
     block: NDArray[np.intp]
     margin_s: float
     _shifted: dict[float, Array] = field(default_factory=dict)
@@ -70,6 +71,7 @@ class Channels:
         """
         out = np.zeros((self.rows, reading.joints, 2, 3))
         moved, second = reading.drives, second_drives(reading)
+        ways = reading.friction_ways or (0.0,) * reading.joints
         for joint in range(reading.joints):
             for number, place in enumerate((joint, second[joint])):
                 share = 0.0 if place is None else float(moved[place, joint])
@@ -77,21 +79,29 @@ class Channels:
                     continue
                 direction = np.zeros(self.motion.position.shape[1])
                 direction[list(reading.position_order)] = moved[place] @ reading.position
-                sign = self._sign_along(direction / (np.abs(direction).max() or 1.0), width)
+                sign = self._sign_along(direction / (np.abs(direction).max() or 1.0), width, ways[joint])
                 velocity, acceleration = (each @ moved[place] for each in (motion.velocity, motion.acceleration))
                 out[:, joint, number] = share * np.stack([velocity, sign, acceleration], axis=1)
         return out
 
-    def _sign_along(self, direction: Array, width: float) -> Array:
-        """The same of a sum of channels; opposite directions share one computation."""
+    def _sign_along(self, direction: Array, width: float, way: float) -> Array:
+        """Sign of the velocity of a sum of channels behind the low-pass, (rows,), or of friction that turns over a way.
+
+        way: share of the sum's travel, 0 for a sign. Opposite directions share one computation.
+        """
         side = 1.0 if direction[np.argmax(np.abs(direction))] > 0 else -1.0
-        key = (side * direction).tobytes()
+        key = (side * direction).tobytes() + np.float64(way).tobytes()
         if key not in self._signs:
-            speeds = [velocity @ (side * direction) for velocity, _, _ in self.velocities]
+            speeds = [velocity @ (side * direction) for _, velocity, _, _ in self.paths]
             top = max(float(np.abs(each).max()) for each in speeds) or 1.0
+            signs = [np.tanh(speed / (width * top)) for speed in speeds]
+            if way > 0:
+                moved = [position @ (side * direction) for position, _, _, _ in self.paths]
+                travel = max(float(np.ptp(each)) for each in moved) or 1.0
+                signs = [dahl_state(each, way * travel) for each in moved]
             parts = [
-                low_pass.smooth(np.tanh(speed / (width * top))[:, None])[rows, 0]
-                for speed, (_, low_pass, rows) in zip(speeds, self.velocities, strict=True)
+                low_pass.smooth(sign[:, None])[rows, 0]
+                for sign, (_, _, low_pass, rows) in zip(signs, self.paths, strict=True)
             ]
             self._signs[key] = np.concatenate(parts)
         return side * self._signs[key]
@@ -154,7 +164,7 @@ def _channels(
     lengths = [_length(each.run) for each in signals]
     margin, whole_s = min(tuning.max_delay_s, tuning.max_delay_share * min(lengths)), sum(lengths)
     step_s = whole_s / tuning.rows
-    motions, stamps, numbers, torques, velocities, blocks = [], [], [], [], [], []
+    motions, stamps, numbers, torques, paths, blocks = [], [], [], [], [], []
     first = 0
     for number, filtered in enumerate(signals):
         time = filtered.run.time
@@ -171,7 +181,7 @@ def _channels(
         motions.append(Motion(raw, motion.velocity[rows] @ undo, motion.acceleration[rows] @ undo))
         stamps.append(time[rows])
         numbers.append(np.full(len(rows), number))
-        velocities.append((motion.velocity @ undo, filtered.filter, rows))
+        paths.append((motion.position @ undo, motion.velocity @ undo, filtered.filter, rows))
         torques.append((time, filtered.filter.smooth(filtered.run.torque) @ undo_torque))
     motion = Motion(*(np.concatenate([getattr(each, name) for each in motions]) for name in _MOTION))
     return Channels(
@@ -179,7 +189,7 @@ def _channels(
         np.concatenate(stamps),
         np.concatenate(numbers),
         tuple(torques),
-        tuple(velocities),
+        tuple(paths),
         np.concatenate(blocks),
         margin,
     )

@@ -30,6 +30,13 @@ class ReadingTuning:
     blocks: int = tuned(
         20, unit="blocks", meaning="blocks of time of all runs, of which every second is held out", least=4
     )
+    friction_ways: tuple[float, ...] = tuned(
+        (0.001, 0.002, 0.004, 0.008, 0.016, 0.032),
+        unit="of a drive's travel",
+        meaning="ways over which friction may turn after a reversal: it lags as torque does that is read late",
+        source="development sets: twice as long a way imitates torque that is 0.3 s late",
+        least=1e-6,
+    )
     max_delay_s: float = tuned(0.5, unit="s", meaning="largest delay that is looked for", least=0.01)
     max_delay_share: float = tuned(
         0.08, unit="of the shortest run", meaning="largest delay that is looked for", most=0.3

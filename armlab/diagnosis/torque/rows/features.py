@@ -13,9 +13,9 @@ import numpy as np
 from scipy.signal import bilinear, lfilter
 
 from armlab.common.arrays import Array
+from armlab.common.dahl import dahl_state
 from armlab.diagnosis.torque.rows.data import Observed
 from armlab.diagnosis.tuning import SurrogateTuning
-from armlab.effects.memory import dahl_state
 
 Part = tuple[Array, tuple[str, ...]]
 
