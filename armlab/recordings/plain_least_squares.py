@@ -277,8 +277,7 @@ def _fit_with_error(layout: "PlainLayout", rows: Sequence[PlainRows]) -> tuple[A
             parts.append(NormalEquations.of(matrix[block], each.torque[block]))
     values, weights = sum_equations(parts).solve()
     draws = np.random.default_rng(0).integers(len(parts), size=(BOOTSTRAP_DRAWS, len(parts)))
-    grams = np.array([np.tensordot(weights, each.gram, axes=1) for each in parts])
-    rights = np.array([weights @ each.right for each in parts])
+    grams, rights = (np.array(each) for each in zip(*(part.weighted(weights) for part in parts), strict=True))
     drawn = [_solve_excited(grams[each].sum(axis=0), rights[each].sum(axis=0)) for each in draws]
     return values, np.std(drawn, axis=0)
 
@@ -410,14 +409,14 @@ class NormalEquations:
         """Least squares with joints weighted by their own residuals, and the weights (joints,)."""
         weights = np.ones(len(self.power))
         for _ in range(WEIGHT_ROUNDS):
-            values = self.solve_with(weights)
+            values = _solve_excited(*self.weighted(weights))
             left = self.power - 2 * self.right @ values + self.gram @ values @ values
             weights = self.rows / np.maximum(left, np.maximum(ROUNDING * self.power, 1e-18))
         return values, weights
 
-    def solve_with(self, weights: Array) -> Array:
-        """Least squares with given weights of the joints (joints,)."""
-        return _solve_excited(np.tensordot(weights, self.gram, axes=1), weights @ self.right)
+    def weighted(self, weights: Array) -> tuple[Array, Array]:
+        """Of all joints together, (columns, columns) and (columns,). weights: (joints,)."""
+        return np.tensordot(weights, self.gram, axes=1), weights @ self.right
 
 
 def sum_equations(parts: Sequence[NormalEquations]) -> NormalEquations:

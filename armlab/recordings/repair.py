@@ -169,17 +169,18 @@ def duplicated_rows(signals: Sequence[Array]) -> NDArray[np.bool_]:
 
     Rows are compared by a hash first, so that memory holds one number a row.
     """
+    import pandas as pd
+
     columns = [column for signal in signals for column in (signal[:, None] if signal.ndim == 1 else signal).T]
     keys = np.zeros(len(columns[0]), dtype=np.uint64)
     for column in columns:
-        keys *= np.uint64(0x9E3779B97F4A7C15)  # odd, of the golden ratio (Knuth, volume 3, 6.4)
-        keys ^= keys >> np.uint64(32)
-        keys += np.where(np.isnan(column), np.nan, column + 0.0).view(np.uint64)  # -0.0 equals 0.0
-    first, at = np.unique(keys, return_index=True, return_inverse=True)[1:]
-    same: NDArray[np.bool_] = np.arange(len(keys)) != first[at]
-    for column in columns:
-        earlier = column[first[at]]
-        same &= (column == earlier) | (np.isnan(column) & np.isnan(earlier))
+        keys *= np.uint64(0x9E3779B97F4A7C15)
+        keys += pd.util.hash_array(column + 0.0)  # -0.0 equals 0.0
+    same = np.zeros(len(keys), dtype=bool)
+    if np.any(np.diff(np.sort(keys)) == 0):
+        suspects = np.flatnonzero(pd.Series(keys).duplicated(keep=False))
+        rows = pd.DataFrame({place: column[suspects] for place, column in enumerate(columns)})
+        same[suspects] = rows.duplicated()
     return same
 
 

@@ -80,7 +80,7 @@ def test_components_that_no_finding_names_are_not_claimed(yardstick: Yardstick) 
 
 def test_blocks_that_are_left_out_cost_a_little_more_than_those_that_are_fitted(yardstick: Yardstick) -> None:
     block = np.arange(observed.rows) * 6 // observed.rows
-    squares = squared_errors(recording.arm, observed, block, yardstick.cutoff_hz)
+    squares = squared_errors(yardstick, observed, block)
     held_out = np.sqrt(squares / np.sum(observed.torque**2, axis=0))
     fitted = np.sqrt(np.mean(yardstick.residual(observed) ** 2, axis=0) / np.mean(observed.torque**2, axis=0))
     assert np.all(held_out < 3 * fitted)

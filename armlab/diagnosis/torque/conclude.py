@@ -227,15 +227,12 @@ def _unnamed_gain(fits: Sequence[JointFit], tuning: PruningTuning) -> JointFit |
 
 def _is_beaten_by(plain: Yardstick, prediction: Prediction) -> bool:
     """Whether plain least squares predicts blocks of the runs that identify better than the model that predicts."""
-    judged, arm = prediction.judged, prediction.model.design.simulation.arm
     try:
-        errors = squared_errors(arm, judged, prediction.block, plain.cutoff_hz)
+        errors = squared_errors(plain, prediction.judged, prediction.block)
     except DataError:
         return False
     return predicts_better(
-        errors.sum(axis=0),
-        prediction.squared_errors.sum(axis=0),
-        prediction.model.design.settings.tuning.prediction.min_trial_gain,
+        errors, prediction.squared_errors, prediction.model.design.settings.tuning.prediction.min_trial_gain
     )
 
 

@@ -22,20 +22,32 @@ from problem.motion import Motion
 
 
 @dataclass(frozen=True, eq=False)
+class DrivenRun:
+    """All samples of a run, before any reading: position and velocity, (samples, channels).
+
+    low_pass: that the torque passed. rows: the samples that became rows of `Channels`.
+    """
+
+    position: Array
+    velocity: Array
+    low_pass: Butterworth
+    rows: NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
 class Channels:
     """Recorded channels, filtered, before any reading.
 
     motion: (rows, channels) of the positions. stamps: (rows,), s. run: (rows,), the number of the run. torques: of each
-    run all stamps (samples,) and torques (samples, channels). paths: of each run, all positions and velocities
-    (samples, channels), with the filter and the samples that became rows. block: (rows,), the number of the block of
-    time. margin_s: how far torque can be shifted in time.
+    run all stamps (samples,) and torques (samples, channels). whole: all samples of each run. block: (rows,), the
+    number of the block of time. margin_s: how far torque can be shifted in time.
     """
 
     motion: Motion
     stamps: Array
     run: NDArray[np.intp]
     torques: tuple[tuple[Array, Array], ...]
-    paths: tuple[tuple[Array, Array, Butterworth, NDArray[np.intp]], ...]
+    whole: tuple[DrivenRun, ...]
     block: NDArray[np.intp]
     margin_s: float
     _shifted: dict[float, Array] = field(default_factory=dict)
@@ -92,16 +104,16 @@ class Channels:
         side = 1.0 if direction[np.argmax(np.abs(direction))] > 0 else -1.0
         key = (side * direction).tobytes() + np.float64(way).tobytes()
         if key not in self._signs:
-            speeds = [velocity @ (side * direction) for _, velocity, _, _ in self.paths]
-            top = max(float(np.abs(each).max()) for each in speeds) or 1.0
-            signs = [np.tanh(speed / (width * top)) for speed in speeds]
             if way > 0:
-                moved = [position @ (side * direction) for position, _, _, _ in self.paths]
-                travel = max(float(np.ptp(each)) for each in moved) or 1.0
-                signs = [dahl_state(each, way * travel) for each in moved]
+                positions = [each.position @ (side * direction) for each in self.whole]
+                travel = max(float(np.ptp(each)) for each in positions) or 1.0
+                signs = [dahl_state(each, way * travel) for each in positions]
+            else:
+                speeds = [each.velocity @ (side * direction) for each in self.whole]
+                top = max(float(np.abs(each).max()) for each in speeds) or 1.0
+                signs = [np.tanh(each / (width * top)) for each in speeds]
             parts = [
-                low_pass.smooth(sign[:, None])[rows, 0]
-                for sign, (_, _, low_pass, rows) in zip(signs, self.paths, strict=True)
+                each.low_pass.smooth(sign[:, None])[each.rows, 0] for sign, each in zip(signs, self.whole, strict=True)
             ]
             self._signs[key] = np.concatenate(parts)
         return side * self._signs[key]
@@ -164,7 +176,7 @@ def _channels(
     lengths = [_length(each.run) for each in signals]
     margin, whole_s = min(tuning.max_delay_s, tuning.max_delay_share * min(lengths)), sum(lengths)
     step_s = whole_s / tuning.rows
-    motions, stamps, numbers, torques, paths, blocks = [], [], [], [], [], []
+    motions, stamps, numbers, torques, whole, blocks = [], [], [], [], [], []
     first = 0
     for number, filtered in enumerate(signals):
         time = filtered.run.time
@@ -181,7 +193,7 @@ def _channels(
         motions.append(Motion(raw, motion.velocity[rows] @ undo, motion.acceleration[rows] @ undo))
         stamps.append(time[rows])
         numbers.append(np.full(len(rows), number))
-        paths.append((motion.position @ undo, motion.velocity @ undo, filtered.filter, rows))
+        whole.append(DrivenRun(motion.position @ undo, motion.velocity @ undo, filtered.filter, rows))
         torques.append((time, filtered.filter.smooth(filtered.run.torque) @ undo_torque))
     motion = Motion(*(np.concatenate([getattr(each, name) for each in motions]) for name in _MOTION))
     return Channels(
@@ -189,7 +201,7 @@ def _channels(
         np.concatenate(stamps),
         np.concatenate(numbers),
         tuple(torques),
-        tuple(paths),
+        tuple(whole),
         np.concatenate(blocks),
         margin,
     )

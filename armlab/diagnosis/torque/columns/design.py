@@ -72,17 +72,17 @@ class DesignMatrix:
         found, groups = compute_moments(self.columns, noise, self.observed), self.columns.groups
         scales = [group.candidate.prior_scale(self.simulation.inertial) for group in groups]
         if as_large_as_torque:
-            scales = [min(pair) for pair in zip(scales, map(self._torque_scale, self.blocks), strict=True)]
+            pairs = zip(scales, self.blocks, strict=True)
+            scales = [known if np.isfinite(known) else self._torque_scale(block) for known, block in pairs]
         simulated = [self.simulation.coefficients_of(group.candidate) for group in groups]
         tuning = self.settings.tuning.solver
         return found, Solver(found, groups, len(self.base), self.prior, self.places, scales, simulated, tuning)
 
     def _torque_scale(self, block: Block) -> float:
         """The coefficient with which a law makes as much torque as its joints have; infinite where it makes none."""
-        if np.isfinite(block.candidate.prior_scale(self.simulation.inertial)) or not block.values.any():
-            return np.inf
-        torque = self.observed.torque[:, list(block.candidate.rows)]
-        return float(np.sqrt(np.mean(torque**2) / np.mean(block.values**2)))
+        torque = float(np.sqrt(np.mean(self.observed.torque[:, list(block.candidate.rows)] ** 2)))
+        own = float(np.sqrt(np.mean(block.values**2)))
+        return torque / own if torque > 0 and own > 0 else np.inf
 
     def block(self, candidate: Candidate, variant: int) -> Block:
         """A candidate's filtered columns."""

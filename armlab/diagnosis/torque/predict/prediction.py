@@ -39,7 +39,7 @@ SMOOTHING_STEP = 2**0.5  # from one cut-off of positions that is tried to the ne
 class Prediction:
     """A model that predicts. places: of its groups, by the number that each has in the model of the names; what is not
     claimed there is present here. held_out: ||tau - tau_hat|| / ||tau|| of the filtered torque on blocks held out in
-    turn; squared_errors: of each block and joint there, (blocks, joints). judged, block: the rows of that, and the
+    turn; squared_errors: of each joint there, (joints,). judged, block: the rows of that, and the
     block of each. plain: least squares beside it, None where it could not be fitted.
     """
 
@@ -85,7 +85,7 @@ def fit_prediction(named: FittedModel) -> Prediction:
     best = _better(best, known, tuning)
     model = _settled(replace(best.trial.model, state=best.state), tuning)
     places = {group: place for place, group in enumerate(numbers) if place in best.state.groups}
-    squares, judged = best.trial.errors(best.state), judge.observed
+    squares, judged = best.trial.errors(best.state).sum(axis=0), judge.observed
     return Prediction(model, places, best.held_out, squares, judged, judge.blocks(judged), plain)
 
 

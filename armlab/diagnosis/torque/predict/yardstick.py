@@ -22,7 +22,6 @@ from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.cutoff_trial import choose_cutoff_hz
 from armlab.recordings.plain_least_squares import (
     NormalEquations,
-    PlainLayout,
     PlainModel,
     fit_plain_rows,
     prepare_rows,
@@ -71,38 +70,32 @@ def fit_yardstick(arm: Arm, observed: Observed) -> Yardstick | None:
         return None
 
 
-def squared_errors(arm: Arm, observed: Observed, block: NDArray[np.intp], cutoff_hz: float) -> Array:
-    """Of plain least squares on blocks left out in turn, summed over the rows that identify, (blocks, joints).
+def squared_errors(plain: Yardstick, observed: Observed, block: NDArray[np.intp]) -> Array:
+    """Of plain least squares on blocks left out in turn, summed over the rows that identify, (joints,).
 
-    observed, block: the rows that judge, and the block of each. Raises ValueError where too few rows are left.
+    observed, block: the rows that judge, and the block of each. Raises ValueError where no rows are left.
     """
-    identify = rows_in(observed.of_role("identify"), observed.rows)
-    own_rows = np.split(np.arange(observed.rows), np.cumsum([len(each.torque) for each in observed.signals])[:-1])
-    fitted = []  # of each run its rows, and the block of each, -1 where it does not identify
-    for signals, own in zip(observed.signals, own_rows, strict=True):
-        rows = prepare_rows(signals.run, cutoff_hz)
-        near = own[np.clip(np.searchsorted(signals.time, rows.time), 0, len(own) - 1)]
-        fitted.append((rows, np.where(identify[near], block[near], -1)))
-    numbers, found = np.unique(block[identify]), np.unique(np.concatenate([own for _, own in fitted]))
-    if len(found[found >= 0]) < 2:
-        raise DataError("too few rows to leave blocks out")
-    speeds = [np.abs(rows.motion.velocity[own >= 0]).max(axis=0, initial=0.0) for rows, own in fitted]
-    layout = PlainLayout(arm, tuple(range(len(arm))), np.max(speeds, axis=0))
-    sums: dict[int, list[NormalEquations]] = {number: [] for number in numbers.tolist()}
-    for rows, own in fitted:
-        matrix = layout.matrix(rows.motion)
-        for number in np.unique(own[own >= 0]).tolist():
-            sums[number].append(NormalEquations.of(matrix[own == number], rows.torque[own == number]))
-    values = [
-        sum_equations([each for number in sums if number != left_out for each in sums[number]]).solve()[0]
-        for left_out in sums
-    ]
-    errors = np.zeros((len(numbers), observed.joints))
-    for signals, own in zip(observed.signals, own_rows, strict=True):
-        predicted = PlainModel(layout, cutoff_hz, np.column_stack(values)).predict(signals.run)
-        left = signals.torque[:, :, None] - signals.filter(predicted)
-        for place, number in enumerate(numbers):
-            errors[place] += np.sum(left[identify[own] & (block[own] == number), :, place] ** 2, axis=0)
+    identify, layout = rows_in(observed.of_role("identify"), observed.rows), plain.model.layout
+    ends = np.cumsum([len(each.torque) for each in observed.signals])
+    blocks = np.split(np.where(identify, block, -1), ends[:-1])  # of each run
+    sums: list[list[NormalEquations]] = [[] for _ in range(int(block.max()) + 1)]
+    for signals, own in zip(observed.signals, blocks, strict=True):
+        rows = prepare_rows(signals.run, plain.cutoff_hz)
+        near, matrix = np.searchsorted(signals.time, rows.time), layout.matrix(rows.motion)
+        of_row = own[np.clip(near, 0, len(own) - 1)]
+        for number in np.unique(of_row[of_row >= 0]).tolist():
+            chosen = of_row == number
+            sums[number].append(NormalEquations.of(matrix[chosen], rows.torque[chosen]))
+    values = []
+    for left_out in range(len(sums)):
+        others = [each for number, parts in enumerate(sums) if number != left_out for each in parts]
+        if not others:
+            raise DataError("too few rows to leave a block out")
+        values.append(sum_equations(others).solve()[0])
+    model, errors = PlainModel(layout, plain.cutoff_hz, np.column_stack(values)), np.zeros(observed.joints)
+    for signals, own in zip(observed.signals, blocks, strict=True):
+        predicted = signals.filter(model.predict(signals.run))[np.arange(len(own)), :, own]  # without the own block
+        errors += np.sum((signals.torque - predicted)[own >= 0] ** 2, axis=0)
     return errors
 
 
