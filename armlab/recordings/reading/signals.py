@@ -22,7 +22,7 @@ from problem.motion import Motion
 
 
 @dataclass(frozen=True, eq=False)
-class DrivenRun:
+class RunSamples:
     """All samples of a run, before any reading: position and velocity, (samples, channels).
 
     low_pass: that the torque passed. rows: the samples that became rows of `Channels`.
@@ -39,7 +39,7 @@ class Channels:
     """Recorded channels, filtered, before any reading.
 
     motion: (rows, channels) of the positions. stamps: (rows,), s. run: (rows,), the number of the run. torques: of each
-    run all stamps (samples,) and torques (samples, channels). whole: all samples of each run. block: (rows,), the
+    run all stamps (samples,) and torques (samples, channels). samples: of each run. block: (rows,), the
     number of the block of time. margin_s: how far torque can be shifted in time.
     """
 
@@ -47,7 +47,7 @@ class Channels:
     stamps: Array
     run: NDArray[np.intp]
     torques: tuple[tuple[Array, Array], ...]
-    whole: tuple[DrivenRun, ...]
+    samples: tuple[RunSamples, ...]
     block: NDArray[np.intp]
     margin_s: float
     _shifted: dict[float, Array] = field(default_factory=dict)
@@ -105,15 +105,16 @@ class Channels:
         key = (side * direction).tobytes() + np.float64(way).tobytes()
         if key not in self._signs:
             if way > 0:
-                positions = [each.position @ (side * direction) for each in self.whole]
+                positions = [each.position @ (side * direction) for each in self.samples]
                 travel = max(float(np.ptp(each)) for each in positions) or 1.0
                 signs = [dahl_state(each, way * travel) for each in positions]
             else:
-                speeds = [each.velocity @ (side * direction) for each in self.whole]
+                speeds = [each.velocity @ (side * direction) for each in self.samples]
                 top = max(float(np.abs(each).max()) for each in speeds) or 1.0
                 signs = [np.tanh(each / (width * top)) for each in speeds]
             parts = [
-                each.low_pass.smooth(sign[:, None])[each.rows, 0] for sign, each in zip(signs, self.whole, strict=True)
+                each.low_pass.smooth(sign[:, None])[each.rows, 0]
+                for sign, each in zip(signs, self.samples, strict=True)
             ]
             self._signs[key] = np.concatenate(parts)
         return side * self._signs[key]
@@ -176,7 +177,7 @@ def _channels(
     lengths = [_length(each.run) for each in signals]
     margin, whole_s = min(tuning.max_delay_s, tuning.max_delay_share * min(lengths)), sum(lengths)
     step_s = whole_s / tuning.rows
-    motions, stamps, numbers, torques, whole, blocks = [], [], [], [], [], []
+    motions, stamps, numbers, torques, samples, blocks = [], [], [], [], [], []
     first = 0
     for number, filtered in enumerate(signals):
         time = filtered.run.time
@@ -193,7 +194,7 @@ def _channels(
         motions.append(Motion(raw, motion.velocity[rows] @ undo, motion.acceleration[rows] @ undo))
         stamps.append(time[rows])
         numbers.append(np.full(len(rows), number))
-        whole.append(DrivenRun(motion.position @ undo, motion.velocity @ undo, filtered.filter, rows))
+        samples.append(RunSamples(motion.position @ undo, motion.velocity @ undo, filtered.filter, rows))
         torques.append((time, filtered.filter.smooth(filtered.run.torque) @ undo_torque))
     motion = Motion(*(np.concatenate([getattr(each, name) for each in motions]) for name in _MOTION))
     return Channels(
@@ -201,7 +202,7 @@ def _channels(
         np.concatenate(stamps),
         np.concatenate(numbers),
         tuple(torques),
-        tuple(whole),
+        tuple(samples),
         np.concatenate(blocks),
         margin,
     )

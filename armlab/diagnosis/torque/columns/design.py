@@ -66,8 +66,9 @@ class DesignMatrix:
     def solver(self, noise: Noise, as_large_as_torque: bool = False) -> tuple[Moments, Solver]:
         """Moments and solver under a noise model.
 
-        as_large_as_torque: a law of which no size is known has a normal prior about zero, with the torque of its joints
-        for standard deviation. Where a joint goes one way only, no data part its Coulomb friction from its offset.
+        as_large_as_torque: a law whose size is not known has a normal prior about zero, with the torque of its joints
+        as standard deviation. Where a joint moves in one direction only, data cannot separate its Coulomb friction from
+        its offset.
         """
         found, groups = compute_moments(self.columns, noise, self.observed), self.columns.groups
         scales = [group.candidate.prior_scale(self.simulation.inertial) for group in groups]
