@@ -119,7 +119,7 @@ def _settled(model: FittedModel, tuning: PredictionTuning) -> FittedModel:
     present, residual = model, model.residual(model.fit)
     for _ in range(tuning.max_follow_rounds):
         design = follow_model(present.design, present)
-        present = replace(_fitted(design, present.noise, present.state.widths), state=present.state)
+        present = replace(fit_with_prior(design, present.noise, present.state.widths), state=present.state)
         left = present.residual(present.fit)
         change = np.sum((left - residual) ** 2)
         residual = left
@@ -221,10 +221,10 @@ class _Trial:
         observed, tuning = design.observed, design.settings.tuning
         if noise is None:
             plain = fit_noise(design.target, observed, 0.0, tuning.noise, colour=False)
-            first = _fitted(design, plain, state.widths)
+            first = fit_with_prior(design, plain, state.widths)
             left = first.residual(first.solver.fit(with_usual(first, names)))
             noise = fit_noise(left, observed, 0.0, tuning.noise, colour=False)
-        model = _fitted(design, noise, state.widths)
+        model = fit_with_prior(design, noise, state.widths)
         everything = model.solver.fit(State(tuple(range(len(model.solver.groups))), state.widths))
         unit, lengths = _unit_noise(judge.observed), model.moments.lengths
         rows = whitened_rows(design.columns, {}, everything, lengths, noise, observed, tuning.blocks)
@@ -366,7 +366,8 @@ def _is_sure(gains: Array, tuning: PredictionTuning) -> bool:
     return bool(np.mean(gains) > max(tuning.min_gain, tuning.min_standard_errors * error))
 
 
-def _fitted(design: DesignMatrix, noise: Noise, widths: tuple[float, ...] | None) -> FittedModel:
+def fit_with_prior(design: DesignMatrix, noise: Noise, widths: Widths | None) -> FittedModel:
+    """A model without any law yet; laws whose size is not known have a prior of the size of the torque."""
     moments, solver = design.solver(noise, as_large_as_torque=True)
     return FittedModel(design, noise, moments, solver, State((), widths))
 
