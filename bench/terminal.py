@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 
 import pandas as pd
 
-from armlab.common.text_table import text_table
 from bench.printed import display_name
 from bench.statistics.critical_difference import ERROR_RATE, CriticalDifference, critical_difference
 from bench.statistics.pairwise import log_losses
@@ -58,3 +57,9 @@ def _table_lines(frame: pd.DataFrame) -> list[str]:
         rows.append([*(str(row[name]) for name in names), *numbers])
     more = len(table) - MAX_ROWS
     return [*text_table(rows), *([f"and {more} rows more"] if more > 0 else [])]
+
+
+def text_table(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of a table whose columns are as wide as their longest cell."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]

@@ -178,7 +178,7 @@ def _assemble(
     unnamed = _unnamed_gain(fits, tuning.pruning) if not claims else None
     status: Status = "mismatch" if claims else "none" if unnamed is None else "inconclusive"
     base, covariance = prediction.model.base_parameters()
-    usual = fit_with_prior(design, model.noise, model.state.widths)
+    held = fit_with_prior(design, model.noise, model.state.widths)
     return Diagnosis(
         recording=recording,
         simulation=simulation,
@@ -195,7 +195,7 @@ def _assemble(
         claims=claims,
         parts=parts,
         is_plain=is_plain_best,
-        friction=joint_friction(replace(usual, state=with_usual(usual, model.state.groups))),
+        friction=joint_friction(replace(held, state=with_usual(held, model.state.groups))),
         located=locate_excess(start, floor, observed, tuning.location) if claims else (),
         unexplained=tuple(
             Unexplained(each.joint + 1, float(np.clip(each.share, 0, 1)), each.depends_on) for each in remains

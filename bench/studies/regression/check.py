@@ -12,9 +12,9 @@ from scipy.stats import mannwhitneyu
 
 from armlab.common.arrays import Array
 from armlab.common.statistics import adjust_by_holm
-from armlab.common.text_table import text_table
 from bench.statistics import quantile
 from bench.studies.regression.sweep import Baseline, Cell, Ends
+from bench.terminal import text_table
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,8 +39,8 @@ SMOOTHING_STEP = 2**0.5  # from one cut-off of positions that is tried to the ne
 class Prediction:
     """A model that predicts. places: of its groups, by the number that each has in the model of the names; what is not
     claimed there is present here. held_out: ||tau - tau_hat|| / ||tau|| of the filtered torque on blocks held out in
-    turn; squared_errors: of each joint there, (joints,). judged, block: the rows of that, and the
-    block of each. plain: least squares beside it, None where it could not be fitted.
+    turn; squared_errors: of each joint there, (joints,). judged, block: the rows of that, and the block of each. plain:
+    least squares beside it, None where it could not be fitted.
     """
 
     model: FittedModel
