@@ -1,7 +1,7 @@
 """The stacked columns of everything that may add to the torque, and the products of the whitened ones."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -114,11 +114,15 @@ def base_columns(arm: Arm, base: BaseParameters, runs: Sequence[Signals]) -> lis
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Filtered columns of one candidate, kept to be stacked again: (rows, rows of the candidate, coefficients)."""
+    """Filtered columns of one candidate, kept to be stacked again: (rows, rows of the candidate, coefficients).
+
+    slopes: their derivatives by the candidate's shapes, which `DesignMatrix.slope` keeps here by number.
+    """
 
     candidate: Candidate
     variant: int
     values: Array
+    slopes: dict[int, Array] = field(default_factory=dict)
 
 
 def stack_columns(base: BaseParameters, rigid: list[Array], blocks: Sequence[Block], target: Array) -> Columns:

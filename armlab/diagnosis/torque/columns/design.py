@@ -30,6 +30,7 @@ from armlab.recordings.differentiate import Signals
 from problem.base_parameters import BaseParameters
 from problem.motion import Motion
 
+SHAPE_STEP = 1e-4  # of the way between a shape's bounds, for derivatives
 
 @dataclass(frozen=True, eq=False)
 class DesignMatrix:
@@ -89,6 +90,24 @@ class DesignMatrix:
         """A candidate's filtered columns."""
         same = self.settings.guards.same_filter
         return Block(candidate, variant, filtered_columns(candidate, self.scenes_of(candidate), self.observed, same))
+
+    def slope(self, number: int, which: int) -> Array:
+        """Derivative of a block's columns by one of its candidate's shapes, as large as its columns."""
+        block = self.blocks[number]
+        if which not in block.slopes:
+            block.slopes[which] = self._slope(block, which)
+        return block.slopes[which]
+
+    def _slope(self, block: Block, which: int) -> Array:
+        low, high = block.candidate.bounds[which]
+        ends = []
+        for sign in (1, -1):
+            shape = list(block.candidate.shape)
+            shape[which] = float(np.clip(shape[which] + sign * SHAPE_STEP * (high - low), low, high))
+            moved = self.block(block.candidate.with_shape(tuple(shape)), block.variant)
+            ends.append((shape[which], moved.values))
+        width = ends[0][0] - ends[1][0]
+        return np.asarray((ends[0][1] - ends[1][1]) / (width or 1.0))
 
     def scenes_of(self, candidate: Candidate) -> tuple[Scene, ...]:
         """The scenes that a candidate sees."""

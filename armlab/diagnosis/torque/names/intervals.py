@@ -11,7 +11,6 @@ from armlab.diagnosis.torque.search.fitted_model import FittedModel
 from armlab.diagnosis.torque.search.refine import prior_precision
 
 CONFIDENCE = 0.95  # of the intervals that a verdict calls ci95
-SHAPE_STEP = 1e-4  # of the way between a shape's bounds, for derivatives
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +60,8 @@ def extend_with_shapes(model: FittedModel) -> ShapedFit:
         count = len(candidate.shape)
         if not count:
             continue
-        slopes = [_shape_derivative(model, group, which) for which in range(count)]
+        values = model.solver.values(fit, group)
+        slopes = [design.slope(group, which) @ values for which in range(count)]
         for joint in extra:
             own = np.zeros((design.observed.rows, count))
             if joint in candidate.rows:
@@ -102,16 +102,3 @@ def _units(model: FittedModel, group: int, shapes: Array, place: slice | None) -
     before = len(model.fit.inverse)
     own = [shapes[number - before] for number in _places(place)]
     return np.append(model.moments.lengths[model.solver.groups[group].columns], own)
-
-
-def _shape_derivative(model: FittedModel, group: int, which: int) -> Array:
-    """Derivative of a group's filtered torque by one of its shapes, (rows, rows of the candidate)."""
-    candidate, values = model.candidate(group), model.solver.values(model.fit, group)
-    low, high = candidate.bounds[which]
-    ends = []
-    for sign in (1, -1):
-        shape = list(candidate.shape)
-        shape[which] = float(np.clip(shape[which] + sign * SHAPE_STEP * (high - low), low, high))
-        ends.append((shape[which], model.design.block(candidate.with_shape(tuple(shape)), 0).values @ values))
-    width = ends[0][0] - ends[1][0]
-    return np.asarray((ends[0][1] - ends[1][1]) / (width or 1.0))
