@@ -119,14 +119,13 @@ class FitOfAll:
         return Remainder(self.residual - self.rows @ moved, features)
 
 
-def flexible_gain(model: FittedModel, state: State, joint: int) -> float:
-    """What the best surrogate explains of what a state leaves at a joint (from 0): see `Structure.gain`."""
-    known = model.solver.flexible_gains
-    if (state, joint) not in known:
-        beside = replace(model, state=state)
-        features = _features_of(beside, joint, _load(beside))
-        known[state, joint] = max(each.gain for each in _surrogates(beside, joint, features, model.noise))
-    return known[state, joint]
+def flexible_gain(model: FittedModel, joint: int) -> float:
+    """What the best surrogate explains of what a model leaves at a joint (from 0): see `Structure.gain`."""
+    known, key = model.solver.flexible_gains, (model.state, joint)
+    if key not in known:
+        features = _features_of(model, joint, _load(model))
+        known[key] = max(each.gain for each in _surrogates(model, joint, features, model.noise))
+    return known[key]
 
 
 def is_structured(each: Structure, tuning: Tuning) -> bool:

@@ -38,7 +38,6 @@ from armlab.effects.term import SIGN_SIGMAS
 Place = int | None  # a joint or link, from 1; None for the whole robot
 Kind = Literal["found", "left", "structure"]
 LEAST_GAIN = 0.02  # of the held-out error, where gains are compared as ratios
-MOST_BENT = 30.0  # log likelihood; beyond it a law is certain to bend
 MOST_COLOUR = 1.0  # of errors, a logarithm; beyond, the rate of samples says more than the arm does
 
 
@@ -72,11 +71,8 @@ def weigh_effect(model: FittedModel, group: int, claimed: Mapping[int, Evidence]
     none = _against_found(model, evidence, candidate.joint, others, left)
     if candidate.facts.usual:
         none["found usual"] = 1.0
-    else:
-        none["found flexible"] = _flexible_ratio(model, without, evidence)
-        if candidate.facts.scales_torque:
-            bent = _bent_gain(model, without, group)
-            none["found bent"] = float(np.log1p(min(bent, MOST_BENT)))
+    elif candidate.facts.scales_torque:
+        bent = _bent_gain(model, without, group)
     return _weighed("found", trials, none, (candidate.joint, candidate.joints), model, without, model.fit.score + bent)
 
 
@@ -96,7 +92,7 @@ def weigh_link(
     trials += _bodies(model, without, place_body(model, without), None)
     trials += _other_links(model, without, link, max(widths))
     none = _against_found(model, evidence, link + 1, list(claimed), left)
-    none |= {"found link": 1.0, "found flexible": _flexible_ratio(model, without, evidence)}
+    none["found link"] = 1.0
     return _weighed("found", trials, none, (link + 1, ()), model, without)
 
 
@@ -119,7 +115,7 @@ def weigh_addition(
         "left colour": _colour(model, evidence.joint),
         "left structure": _structured_share(model, left, evidence.joint),
         "left structure chance": _structure_chance(left, evidence.joint),
-        "left flexible": _flexible_ratio(model, model.state, evidence),
+        "left flexible": _flexible_ratio(model, evidence),
     }
     trials = _in_place(model, model.state, group, beside=added)
     return _weighed("left", trials, none, (candidate.joint, candidate.joints), model, model.state)
@@ -238,9 +234,9 @@ def _structured_share(model: FittedModel, left: Sequence[Structure], joint: int)
     return max((predicted_share(each) for each in here), default=0.0)
 
 
-def _flexible_ratio(model: FittedModel, without: State, evidence: Evidence) -> float:
-    """The logarithm of how much more a flexible law explains than a finding does in whose place it stands."""
-    flexible = flexible_gain(model, without, evidence.joint)
+def _flexible_ratio(model: FittedModel, evidence: Evidence) -> float:
+    """The logarithm of how much more a flexible law explains beside a model than what would be added explains."""
+    flexible = flexible_gain(model, evidence.joint)
     ratio = (max(flexible, 0.0) + LEAST_GAIN) / (max(evidence.gain, 0.0) + LEAST_GAIN)
     return max(float(np.log(ratio)), -2.0)
 
