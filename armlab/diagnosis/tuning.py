@@ -173,8 +173,6 @@ class RefineTuning:
     )
     logarithmic_ratio: float = tuned(30.0, "bounds so far apart are searched by their logarithm", least=1.0)
     first_step: float = tuned(0.08, "first step of the local search", "of the way between the bounds", least=1e-6)
-    shape_tolerance: float = tuned(1e-4, "change of the shape that ends the search", "of the way between the bounds")
-    gain_tolerance: float = tuned(0.05, "change of the gain that ends the search", "log likelihood")
 
 
 @dataclass(frozen=True)
@@ -233,7 +231,7 @@ class PredictionTuning:
 class EvidenceTuning:
     """The evidence for each effect."""
 
-    block_s: float = tuned(1.0, "length of the stretches of validation runs that are compared", "s", least=1e-3)
+    block_s: float = tuned(1.0, "length of the stretches of time that are compared", "s", least=1e-3)
     min_blocks: int = tuned(12, "least number of these stretches", "stretches", least=2)
     push_level: float = tuned(0.3, "rows above it belong to the push", "of a push's peak", most=0.99)
     min_push_s: float = tuned(0.15, "a push that is shorter in motion is a reversal", "s")
@@ -349,11 +347,7 @@ class SurrogateTuning:
 class LocationTuning:
     """Where the error is beyond the noise."""
 
-    bins: int = tuned(10, "quantile bins of a variable", "bins", least=2)
-    block_s: float = tuned(
-        1.0, "length of the stretches whose scatter decides whether an excess is chance", "s", least=1e-3
-    )
-    min_blocks: int = tuned(3, "least number of these stretches", "stretches", least=2)
+    bins: int = tuned(10, "quantile bins of a variable, and of the time of a run: no peak is longer", "bins", least=2)
     min_significance: float = tuned(
         2.0, "excess error of a joint that is more than chance", "standard errors times sqrt(log(stretches + 1))"
     )
@@ -363,7 +357,6 @@ class LocationTuning:
         "of the worst bin's or run's excess, or of all excess",
         most=0.99,
     )
-    peak_parts: int = tuned(10, "a peak is no longer than one of so many equal parts of a run", least=1)
 
 
 @dataclass(frozen=True)
@@ -537,7 +530,6 @@ class ComparisonTuning:
         "gain that a change makes on stretches of the recordings that are held out in turn",
         "of the held-out error",
     )
-    max_rivals: int = tuned(2, "most rivals of a change", "rivals", source="a class has three names")
     max_asked: int = tuned(12, "candidates that are tested at each step", "candidates", least=1)
     max_changes: int = tuned(8, "most changes that are named", "changes", least=1)
 

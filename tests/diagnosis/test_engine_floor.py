@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.torque.evidence.location import period_scatter
+from armlab.diagnosis.torque.location import period_scatter
 from armlab.recordings.differentiate import differentiate
 from armlab.recordings.filters import Butterworth
 from armlab.recordings.recording import Run

@@ -231,7 +231,7 @@ def test_loads_of_replayed_joints_end_at_the_motion_of_the_arm(soft: Path) -> No
 
     measured = error(make_windows(runs, simulation))
     replayed = [
-        error(coupled_windows(runs, simulation, [true, true], replace(DEFAULT, coupling_replays=replays)))
+        error(coupled_windows(runs, simulation, [true, true], replace(DEFAULT, coupling_rounds=replays)))
         for replays in (1, 3, 6)
     ]
     assert replayed[1] < 0.85 * measured

@@ -21,7 +21,7 @@ from armlab.proof.open.motion.public_servos import peer_section
 from armlab.recordings.motion import load_motion_recording
 
 TRUTH = {"kp": 8.0, "kv": 0.0, "damping": 0.5, "frictionloss": 0.1, "delay": 0.02}
-QUICK = replace(DEFAULT, coupling_choices=1, max_step_error=1e3)  # numbers are chosen once, and the step stays
+QUICK = replace(DEFAULT, coupling_rounds=1, max_step_error=1e3)  # numbers are chosen once, and the step stays
 
 
 @pytest.fixture(scope="module")

@@ -440,9 +440,12 @@ def test_degrees_are_those_of_joints_that_turn() -> None:
     assert ("unit_error@2", 180 / np.pi) not in scaled
 
 
-def test_a_mistake_that_too_many_others_fit_is_a_doubt_and_nothing_is_corrected(tmp_path: Path) -> None:
+def test_a_mistake_that_too_many_others_fit_is_a_doubt_and_nothing_is_corrected(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("armlab.recordings.reading.answer.MAX_CLASS_NAMES", 0)
     recording = recording_with(tmp_path / "rig", scale(["tau2"], -1.0))
-    answer = read_rightly(recording, recording.arm.parameters, replace(TUNING, max_class=0))
+    answer = read_rightly(recording, recording.arm.parameters, TUNING)
     assert answer.findings == ()
     assert answer.recording is recording
     assert [(each.effect, each.joints) for each in answer.doubts] == [("torque_sign", (2,))]

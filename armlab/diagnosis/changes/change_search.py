@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.common.told import MAX_CLASS_NAMES
 from armlab.diagnosis.changes.changes import ChangeTable, Tested
 from armlab.diagnosis.torque.columns.columns import place_of
 
@@ -85,7 +86,7 @@ def find_rivals(table: ChangeTable, chosen: Sequence[int], tested: Tested) -> tu
     deficits = table.deficits(chosen, tested)
     near = [int(each) for each in np.argsort(deficits) if deficits[each] < table.tuning.least_evidence]
     others = [(each, float(max(deficits[each], 0.0))) for each in near if each != tested.group]
-    return tuple(others[: table.tuning.max_rivals])
+    return tuple(others[: MAX_CLASS_NAMES - 1])
 
 
 def held_out_errors(table: ChangeTable, chosen: Sequence[int], number: int) -> tuple[list[Array], list[Array]]:

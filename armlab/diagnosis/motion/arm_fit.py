@@ -70,7 +70,7 @@ def fit_arm(
     windows = coupled_windows(runs, simulation, starts, tuning)
     fit = ArmFit(runs, simulation, starts, windows, [None] * len(windows), tuning)
     unsettled = [number for number, start in enumerate(starts) if start is not None]
-    for _ in range(tuning.coupling_choices):
+    for _ in range(tuning.coupling_rounds):
         fit = _choose(fit, unsettled, progress)
         finer = fine_enough(fit)
         grown = any(each is not None and (each.free & np.array(OPTIONAL)).any() for each in fit.chosen)
@@ -84,7 +84,7 @@ def fit_arm(
 
 
 def _refit(windows: Windows, values: Array, nominal: Array, tuning: MotionTuning) -> Array:
-    few = thin_windows(windows, tuning.max_start_windows)
+    few = thin_windows(windows, tuning.wanted_windows)
     free = free_at_first(values, nominal)
     return fit_servo(begin_integrals(few, values), values, free, tuning.refit_evaluations).values
 
@@ -154,7 +154,7 @@ def number_of_tests(joints: int) -> int:
 
 def _explains(windows: Windows, chosen: ChosenServo, tuning: MotionTuning) -> bool:
     """Whether the command explains the motion: a servo without gain, the rest fitted anew, does much worse."""
-    few = thin_windows(windows, tuning.max_start_windows)
+    few = thin_windows(windows, tuning.wanted_windows)
     free, values = chosen.fit.free.copy(), chosen.fit.values.copy()
     free[place("kp")], values[place("kp")] = False, LOWEST[place("kp")]
     passive = fit_servo(few, values, free, tuning.max_evaluations)

@@ -281,7 +281,7 @@ def _find_unstated(windows: Windows, nominal: Array, tuning: MotionTuning) -> Se
     if np.isnan(nominal[place("ki")]):
         integrating = Unstated(rates=tuning.integral_rates, wound_up=tuning.wound_up_levels)
     both = replace(inside, rates=integrating.rates, wound_up=integrating.wound_up)
-    few, best, least = thin_windows(windows, tuning.max_start_windows), None, np.inf
+    few, best, least = thin_windows(windows, tuning.wanted_windows), None, np.inf
     for unstated in dict.fromkeys((limited, inside, integrating, both)):
         if unstated == Unstated():
             continue
@@ -451,7 +451,7 @@ def find_odd_windows(windows: Windows, values: Array, tuning: MotionTuning = DEF
     errors = joint_errors(windows, values)[0]
     sizes = np.sqrt(np.bincount(windows.window, errors**2) / np.diff(windows.begin))
     moving = np.ptp(windows.measured, axis=1) > tuning.min_motion
-    if moving.sum() < tuning.min_windows_for_odd:
+    if not moving.any():
         return np.zeros(0, dtype=np.intp)
     odd = np.flatnonzero(sizes > tuning.odd_factor * np.median(sizes[moving]))
     return np.sort(odd[np.argsort(-sizes[odd])][: int(tuning.max_odd_share * windows.count)])
@@ -462,7 +462,7 @@ def _odd_with_any_limit(windows: Windows, fit: ServoFit, nominal: Array, tuning:
     odd = find_odd_windows(windows, fit.values, tuning)
     if len(odd) == 0:
         return odd
-    spread = np.linspace(0, windows.count - 1, min(tuning.max_start_windows, windows.count)).astype(int)
+    spread = np.linspace(0, windows.count - 1, min(tuning.wanted_windows, windows.count)).astype(int)
     few = windows.select(np.union1d(spread, odd))
     starts = first_guesses(few, fit.values, place("limit"), tuning)
     best = starts[int(np.argmin(np.sum(joint_errors(few, np.stack(starts)) ** 2, axis=1)))]

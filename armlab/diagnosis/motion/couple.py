@@ -58,7 +58,7 @@ def coupled_windows(
     replayed = np.array([each is not None for each in fitted])
     values = np.stack([np.zeros(len(PARAMETERS)) if each is None else each for each in fitted])
     paths = _measured_paths(runs, windows[0], replayed, simulation.read_delay, tuning)
-    for _ in range(tuning.coupling_replays):
+    for _ in range(tuning.coupling_rounds):
         mass, slope = _own_terms(simulation.arm, simulation, paths)
         settled = windows
         if (values[:, place("ki")] > 0).any():  # an integral carries the whole load

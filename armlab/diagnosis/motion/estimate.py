@@ -313,7 +313,7 @@ def find_start(
 
     nominal: (parameters,), NaN where the simulation does not know a value. unstated: tried in place of its numbers.
     """
-    few = thin_windows(windows, tuning.max_start_windows)
+    few = thin_windows(windows, tuning.wanted_windows)
     starts = _starts(few, nominal, unstated, tuning)
     if unstated.rates:
         errors = np.concatenate([joint_errors(at_rest(few, start), start) for start in starts])

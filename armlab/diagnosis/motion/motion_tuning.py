@@ -11,7 +11,9 @@ class MotionTuning:
 
     longest_window_s: float = tuned(10.0, "longest window of a replay: longer than any servo settles", "s", least=0.1)
     shortest_window_s: float = tuned(1.0, "shorter windows tell little but their first state", "s", least=0.01)
-    wanted_windows: int = tuned(24, "blocks for the statistics, where the recording is long enough", "windows", least=2)
+    wanted_windows: int = tuned(
+        24, "blocks for the statistics, and most for the fits that compare starts", "windows", least=2
+    )
     longest_step_s: float = tuned(0.00125, "longest step of the integration", "s", least=1e-5)
     shortest_step_s: float = tuned(0.0003, "shortest step of the integration: as of a fast drive", "s", least=1e-5)
     max_step_error: float = tuned(
@@ -36,13 +38,9 @@ class MotionTuning:
         "Hz",
         least=0.1,
     )
-    coupling_replays: int = tuned(
-        3, "of the arm, each along the path or with the shared number of the one before", "replays", least=1
-    )
     coupling_rounds: int = tuned(
-        2, "in which the usual numbers and the loads take turns before the choice", "rounds", least=1
+        3, "in which what the joints do to one another and their numbers take turns", "rounds", least=1
     )
-    coupling_choices: int = tuned(3, "most that loads are made and numbers are chosen by turns", "times", least=1)
     held_out_share: float = tuned(
         1 / 3, "its end, held out where no run validates", "of each run", least=0.05, most=0.9
     )
@@ -61,7 +59,6 @@ class MotionTuning:
         "torque limits of the starts of a fit where the drive is not known: it may push fully most of the time",
         "of the torque that the motion needs",
     )
-    max_start_windows: int = tuned(24, "most windows of the fits that compare starts", "windows", least=2)
     starts: int = tuned(2, "starts that are fitted on few windows", "starts", least=1)
     max_evaluations: int = tuned(15, "of a fit from a start", "evaluations", least=1)
     refit_evaluations: int = tuned(
@@ -159,7 +156,6 @@ class MotionTuning:
     )
     max_odd_share: float = tuned(0.1, "most windows that are left out so", "of the windows", most=0.5)
     min_motion: float = tuned(0.01, "windows with less travel say nothing of the usual error", "rad (m)")
-    min_windows_for_odd: int = tuned(8, "with fewer windows in motion none is left out", "windows", least=1)
     max_unexplained: float = tuned(
         0.7, "above it the command did not move the joint", "of the error of a servo without gain", most=1.0
     )
@@ -169,11 +165,10 @@ class MotionTuning:
     )
     class_factor: float = tuned(
         3.0,
-        "growth with one more free number that makes the two a class; size of an integral gain that is there",
+        "growth with one more number free that makes the two a class; size of an integral gain that is there",
         "times a standard error",
         least=1.0,
     )
-    class_correlation: float = tuned(0.95, "correlation of two fitted numbers that makes them a class", most=1.0)
     min_load_share: float = tuned(
         0.1, "gravity below it does not set the scale of torques", "of the drive's torque", most=1.0
     )

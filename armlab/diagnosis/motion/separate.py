@@ -35,8 +35,8 @@ def confused_parameters(
     found: dict[int, list[int]] = {number: [] for number in fitted}
     for first in range(len(fitted)):
         for second in range(len(fitted)):
-            size = np.sqrt(alone[first, first] * alone[second, second])
-            if first != second and abs(alone[first, second]) > tuning.class_correlation * size:
+            known = alone[first, first] - alone[first, second] ** 2 / alone[second, second]  # were the second one known
+            if first != second and alone[first, first] > tuning.class_factor**2 * known:
                 found[fitted[first]].append(fitted[second])
     for other in set(columns) - set(fitted):
         if not np.any(columns[other]):

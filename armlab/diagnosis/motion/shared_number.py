@@ -264,7 +264,7 @@ def find_shared(number: SharedNumber, fit: ArmFit, models: Sequence[JointModel |
     """
     simulation, starts, tuning = fit.simulation, fit.starts, fit.tuning
     odd = _odd_windows(fit.chosen)
-    for remaining in reversed(range(tuning.coupling_replays)):
+    for remaining in reversed(range(tuning.coupling_rounds)):
         joints = {
             at: JointModel(_sound(each.windows, odd, tuning), each.values, each.free)
             for at, each in enumerate(models)

@@ -12,7 +12,6 @@ from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.solver import State
 from armlab.diagnosis.torque.evidence.evidence import Judge, count_looks
-from armlab.diagnosis.torque.evidence.location import locate_excess, noise_floor
 from armlab.diagnosis.torque.evidence.plausibility import (
     links_that_data_tell,
 )
@@ -21,6 +20,7 @@ from armlab.diagnosis.torque.evidence.unknown import (
     make_unknown_claim,
     remaining,
 )
+from armlab.diagnosis.torque.location import locate_excess, noise_floor
 from armlab.diagnosis.torque.names.claims import Names, links_claim, make_claims
 from armlab.diagnosis.torque.names.decide import lost_names, named_claims
 from armlab.diagnosis.torque.names.findings import stated_findings, with_minor_ones, without_lesser_unknowns
@@ -166,7 +166,7 @@ def _assemble(
     noise = final.copy()
     for each in unknowns:
         noise[:, each.joint] -= each.prediction
-    floor = noise_floor(noise, design.features, observed, tuning.surrogate)
+    floor = noise_floor(noise, design.features, observed, tuning)
     fits = joint_fits(refit, (found, alone), plain, floor, observed, tuning)
     parts = explain_error(prediction.model, observed, claims, (start, final), floor)
     claims = without_lesser_unknowns(claims, parts)
@@ -196,7 +196,7 @@ def _assemble(
         parts=parts,
         is_plain=is_plain_best,
         friction=joint_friction(replace(held, state=with_usual(held, model.state.groups))),
-        located=locate_excess(start, floor, observed, tuning.location) if claims else (),
+        located=locate_excess(start, floor, observed, tuning) if claims else (),
         unexplained=tuple(
             Unexplained(each.joint + 1, float(np.clip(each.share, 0, 1)), each.depends_on) for each in remains
         ),

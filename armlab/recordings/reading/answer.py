@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.common.told import MAX_CLASS_NAMES, MIN_CAUSE_PROBABILITY
 from armlab.recordings.dead_joints import NO_TORQUE
 from armlab.recordings.reading.corrected import correct_recording
 from armlab.recordings.reading.judge import ReadingJudge
@@ -177,7 +178,7 @@ def _find_answer(recording: Recording, inertial: Array | None, tuning: ReadingTu
     doubts = tuple(_doubt(each.reading.mistakes[-1], recording.arm) for each in found.doubts)
     mistakes = found.best.reading.mistakes
     findings = tuple(_finding(judge, found, place) for place, each in enumerate(mistakes) if each.effect != SPRING)
-    if any(len(each.rivals) >= tuning.max_class or each.of_class < LEAST_TOLD for each in findings):
+    if any(len(each.rivals) >= MAX_CLASS_NAMES or each.of_class < MIN_CAUSE_PROBABILITY for each in findings):
         doubts += tuple(_doubt(each.mistake, recording.arm) for each in findings)
         return Answer((), recording, None, share, share, doubts=doubts, looks=found.looks)
     after = judge.overall_error(found.best)
@@ -202,7 +203,6 @@ def _doubt(mistake: Mistake, arm: Arm) -> Doubt:
 
 
 UNSIGNED = "unsigned_current"
-LEAST_TOLD = 0.5  # probability below which nothing is stated (the contract of verdicts)
 SMALLEST_SHARE = 1e-9  # of a joint that stands still
 
 

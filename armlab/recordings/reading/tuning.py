@@ -115,12 +115,6 @@ class ReadingTuning:
     min_slope_likeness: float = tuned(
         0.9, meaning="correlation and slope from which on a recorded velocity confirms the clock", most=0.999
     )
-    max_class: int = tuned(
-        3,
-        unit="rivals",
-        meaning="so many rivals leave open how a recording is to be read",
-        source="a class has three names",
-    )
     other_links_chance: float = tuned(
         0.5, meaning="chance of links that are off, against a mistake that only the links of the simulation tell"
     )

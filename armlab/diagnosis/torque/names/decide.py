@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from armlab.common.told import MAX_CLASS_NAMES, MIN_CAUSE_PROBABILITY, MIN_NAME_PROBABILITY
 from armlab.diagnosis.choice import Weights, probabilities
 from armlab.diagnosis.result import Claim, Member, Weighed, WeighedName
 from armlab.diagnosis.settings import Settings
@@ -21,9 +22,6 @@ from armlab.effects.library import effect_named
 
 CALIBRATION_FILE: Final = "calibration.json"
 LIMIT_FILE: Final = "unknown_limit.json"
-MIN_NAME_PROBABILITY: Final = 0.9  # of a name that is stated, and of all names of a class together
-MIN_CAUSE_PROBABILITY: Final = 0.5  # of a cause that is stated without its law
-MAX_CLASS_NAMES: Final = 3
 MOTION_AXES: Final = ("velocity", "position", "acceleration")
 
 

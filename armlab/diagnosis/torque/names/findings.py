@@ -8,8 +8,8 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from armlab.common.told import MAX_CLASS_NAMES, MIN_CAUSE_PROBABILITY, MIN_NAME_PROBABILITY
 from armlab.diagnosis.result import Claim, Member, Part
-from armlab.diagnosis.torque.names.decide import MAX_CLASS_NAMES, MIN_CAUSE_PROBABILITY, MIN_NAME_PROBABILITY
 from armlab.diagnosis.torque.predict.parts import UNKNOWN_CAUSE, cause_of
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named

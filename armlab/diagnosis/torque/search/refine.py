@@ -91,8 +91,6 @@ def _search_shape(design: DesignMatrix, noise: Noise, profile: Profile, block: B
     options = {
         "maxfev": tuning.evaluations_per_shape * len(start),
         "initial_simplex": np.vstack([start, *(start + step for step in steps)]),
-        "xatol": tuning.shape_tolerance,
-        "fatol": tuning.gain_tolerance,
     }
     minimize(loss, start, method="Nelder-Mead", options=options)
     return best[1] if best[1] is not block else None

@@ -9,12 +9,12 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.result import Located
 from armlab.diagnosis.torque.rows.data import Observed, rows_in
 from armlab.diagnosis.torque.search.surrogate import FoldedFeatures, predict_structure
-from armlab.diagnosis.tuning import LocationTuning, SurrogateTuning
+from armlab.diagnosis.tuning import Tuning
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.periods import find_period
 
 
-def noise_floor(final: Array, made: Sequence[FoldedFeatures], observed: Observed, tuning: SurrogateTuning) -> Array:
+def noise_floor(final: Array, made: Sequence[FoldedFeatures], observed: Observed, tuning: Tuning) -> Array:
     """RMS (joints,), N m (N), of the noise of the filtered torque.
 
     final: (rows, joints), what the model leaves. What it leaves less what a surrogate can foretell of it: structure
@@ -23,7 +23,7 @@ def noise_floor(final: Array, made: Sequence[FoldedFeatures], observed: Observed
     """
     floor = np.empty(final.shape[1])
     for joint, features in enumerate(made):
-        left = final[:, joint] - predict_structure(final[:, joint], joint, features, observed, tuning)
+        left = final[:, joint] - predict_structure(final[:, joint], joint, features, observed, tuning.surrogate)
         floor[joint] = np.sqrt(np.mean(left[rows_in(observed.used(joint), observed.rows)] ** 2))
     scatter = [each for each in map(period_scatter, observed.signals) if each is not None]
     return np.minimum(floor, np.sqrt(np.mean(np.square(scatter), axis=0))) if scatter else floor
@@ -40,7 +40,7 @@ def period_scatter(signals: Signals) -> Array | None:
     return np.asarray(np.sqrt(np.mean((curve(early + period) - curve(early)) ** 2, axis=0) / 2))
 
 
-def locate_excess(residual: Array, floor: Array, observed: Observed, tuning: LocationTuning) -> tuple[Located, ...]:
+def locate_excess(residual: Array, floor: Array, observed: Observed, tuning: Tuning) -> tuple[Located, ...]:
     """Joints whose error exceeds the noise. residual: (rows, joints); floor: (joints,), N m, of the noise."""
     power = residual**2 - floor**2
     joints = range(residual.shape[1])
@@ -52,16 +52,16 @@ def locate_excess(residual: Array, floor: Array, observed: Observed, tuning: Loc
     return tuple(_locate_in_joint(joint, excess[joint] / total, power[:, joint], observed, tuning) for joint in order)
 
 
-def _significant_excess(power: Array, rate_hz: float, tuning: LocationTuning) -> float:
+def _significant_excess(power: Array, rate_hz: float, tuning: Tuning) -> float:
     """Mean excess power, zero where it may be chance: tested between stretches of time, errors being tied."""
-    stretches = max(int(len(power) / rate_hz / tuning.block_s), tuning.min_blocks)
+    stretches = max(int(len(power) / rate_hz / tuning.evidence.block_s), tuning.evidence.min_blocks)
     means = np.array([part.mean() for part in np.array_split(power, stretches)])
     error = float(np.std(means, ddof=1) / np.sqrt(stretches))
     mean = float(power.mean())
-    return mean if mean > tuning.min_significance * error * np.sqrt(np.log(len(means) + 1)) else 0.0
+    return mean if mean > tuning.location.min_significance * error * np.sqrt(np.log(len(means) + 1)) else 0.0
 
 
-def _locate_in_joint(joint: int, share: float, power: Array, observed: Observed, tuning: LocationTuning) -> Located:
+def _locate_in_joint(joint: int, share: float, power: Array, observed: Observed, tuning: Tuning) -> Located:
     variables = _joint_variables(joint, observed)
     scored = {name: _best_regime(power, values, tuning) for name, values in variables.items()}
     best = max(scored, key=lambda name: scored[name][0])
@@ -80,15 +80,15 @@ def _joint_variables(joint: int, observed: Observed) -> dict[str, Array]:
     }
 
 
-def _best_regime(power: Array, values: Array, tuning: LocationTuning) -> tuple[float, str]:
+def _best_regime(power: Array, values: Array, tuning: Tuning) -> tuple[float, str]:
     """Share of the excess error's scatter that a variable orders, and the regime with most of it."""
-    count = tuning.bins
+    count = tuning.location.bins
     edges = np.quantile(values, np.linspace(0, 1, count + 1))
     bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, count - 1)
     counts = np.bincount(bins, minlength=count)
     means = np.bincount(bins, power, count) / np.maximum(counts, 1)
     ordered = float(np.average((means - power.mean()) ** 2, weights=counts)) / max(float(np.var(power)), 1e-300)
-    high = np.flatnonzero(means > tuning.min_share * means.max())
+    high = np.flatnonzero(means > tuning.location.min_share * means.max())
     if len(high) >= count - 1:
         return ordered, "over its whole range"
     spans = np.split(high, np.flatnonzero(np.diff(high) > 1) + 1)
@@ -96,24 +96,24 @@ def _best_regime(power: Array, values: Array, tuning: LocationTuning) -> tuple[f
     return ordered, text
 
 
-def _affected_runs(power: Array, observed: Observed, tuning: LocationTuning) -> tuple[str, ...]:
+def _affected_runs(power: Array, observed: Observed, tuning: Tuning) -> tuple[str, ...]:
     """Runs with a large part of the excess of the worst one."""
     means: dict[str, float] = {}
     for index, name in enumerate(observed.names):
         parts = [power[each.start : each.stop] for each in observed.segments if each.run == index]
         means[name] = float(np.mean(np.concatenate(parts)))
     worst = max(means.values())
-    return tuple(name for name, mean in means.items() if mean > tuning.min_share * worst)
+    return tuple(name for name, mean in means.items() if mean > tuning.location.min_share * worst)
 
 
-def _peak_stretch(power: Array, observed: Observed, tuning: LocationTuning) -> tuple[float, float] | None:
+def _peak_stretch(power: Array, observed: Observed, tuning: Tuning) -> tuple[float, float] | None:
     """The short stretch of a run that holds a large part of all excess error; None where there is none."""
     total = float(np.sum(np.maximum(power, 0)))
     for each in observed.segments:
         part = np.maximum(power[each.start : each.stop], 0)
-        width = max(len(part) // tuning.peak_parts, 1)
+        width = max(len(part) // tuning.location.bins, 1)
         sums = np.convolve(part, np.ones(width), mode="valid")
-        if total > 0 and sums.max() > tuning.min_share * total:
+        if total > 0 and sums.max() > tuning.location.min_share * total:
             start = observed.time[each.start + int(np.argmax(sums))]
             return float(start), float(start + width / observed.rate_hz)
     return None
