@@ -22,7 +22,7 @@ from armlab.diagnosis.torque.evidence.unknown import (
 )
 from armlab.diagnosis.torque.location import locate_excess, noise_floor
 from armlab.diagnosis.torque.names.claims import Names, links_claim, make_claims
-from armlab.diagnosis.torque.names.decide import lost_names, named_claims
+from armlab.diagnosis.torque.names.decide import lost_names, named_claims, naming_of
 from armlab.diagnosis.torque.names.findings import stated_findings, with_minor_ones, without_lesser_unknowns
 from armlab.diagnosis.torque.names.weighing import weigh_effect, weigh_link, weigh_structure
 from armlab.diagnosis.torque.predict.fits import joint_fits
@@ -73,12 +73,13 @@ class NamedClaims:
 
 def name_claims(belief: Belief) -> NamedClaims:
     """The claims of what is believed in the end, each with its name."""
-    remains = remaining(belief)
-    explained = {**belief.effects, **belief.present}
+    remains, names, settings = remaining(belief), _weigh_names(belief), belief.model.design.settings
+    nameless = {group for group, each in names.effects.items() if naming_of(each, settings).is_unknown}
+    explained = {group: each for group, each in belief.effects.items() if group not in nameless} | dict(belief.present)
     unknowns = [each for each in remains if not is_form_error(each, explained, belief.tuning.unknown)]
-    model, claims = _claims_of(belief, remains, unknowns)
+    model, claims = _claims_of(belief, names, remains, unknowns)
     weighed = (*(claim.weighed for claim in claims), *belief.nothing)
-    settings, plain = model.design.settings, model.design.simulation.joints_without_friction
+    plain = model.design.simulation.joints_without_friction
     named = named_claims(claims, settings, plain)
     model = replace(model, steps=(*model.steps, *lost_names(claims, named, settings)))
     return NamedClaims(model, named, weighed, unknowns, remains)
@@ -94,16 +95,21 @@ def conclude(recording: Recording, belief: Belief) -> Diagnosis:
     return replace(found, weighed=named.weighed)
 
 
+def _weigh_names(belief: Belief) -> Names:
+    """The names that each effect, and each link that is off, could have."""
+    model, effects = belief.model, belief.effects
+    return Names(
+        {group: belief.weighed.get(group) or weigh_effect(model, group, effects, belief.left) for group in effects},
+        {link: weigh_link(model, link, each, effects, belief.left) for link, each in belief.links.items()},
+    )
+
+
 def _claims_of(
-    belief: Belief, remains: Sequence[Structure], unknowns: Sequence[Structure]
+    belief: Belief, names: Names, remains: Sequence[Structure], unknowns: Sequence[Structure]
 ) -> tuple[FittedModel, tuple[Claim, ...]]:
     """The model with the reasons against claims in its log, and all claims, before a name is chosen for each."""
     model, effects, links = belief.model, belief.effects, belief.links
     assert belief.prediction is not None
-    names = Names(
-        {group: belief.weighed.get(group) or weigh_effect(model, group, effects, belief.left) for group in effects},
-        {link: weigh_link(model, link, each, effects, belief.left) for link, each in links.items()},
-    )
     claims = make_claims(model, effects, links, belief.prediction, names)
     told, claims = links_that_data_tell(model, claims, remains)
     residual = model.residual(model.fit)
