@@ -347,7 +347,9 @@ class SurrogateTuning:
 class LocationTuning:
     """Where the error is beyond the noise."""
 
-    bins: int = tuned(10, "quantile bins of a variable, and of the time of a run: no peak is longer", "bins", least=2)
+    bins: int = tuned(
+        10, "quantile bins of a variable; a peak is no longer than one such part of a run", "bins", least=2
+    )
     min_significance: float = tuned(
         2.0, "excess error of a joint that is more than chance", "standard errors times sqrt(log(stretches + 1))"
     )

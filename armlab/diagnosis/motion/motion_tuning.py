@@ -12,7 +12,7 @@ class MotionTuning:
     longest_window_s: float = tuned(10.0, "longest window of a replay: longer than any servo settles", "s", least=0.1)
     shortest_window_s: float = tuned(1.0, "shorter windows tell little but their first state", "s", least=0.01)
     wanted_windows: int = tuned(
-        24, "blocks for the statistics, and most for the fits that compare starts", "windows", least=2
+        24, "blocks for the statistics; at most so many in fits that compare starts", "windows", least=2
     )
     longest_step_s: float = tuned(0.00125, "longest step of the integration", "s", least=1e-5)
     shortest_step_s: float = tuned(0.0003, "shortest step of the integration: as of a fast drive", "s", least=1e-5)
@@ -39,7 +39,7 @@ class MotionTuning:
         least=0.1,
     )
     coupling_rounds: int = tuned(
-        3, "in which what the joints do to one another and their numbers take turns", "rounds", least=1
+        3, "in which the loads between the joints and their numbers are computed in turn", "rounds", least=1
     )
     held_out_share: float = tuned(
         1 / 3, "its end, held out where no run validates", "of each run", least=0.05, most=0.9
@@ -165,7 +165,7 @@ class MotionTuning:
     )
     class_factor: float = tuned(
         3.0,
-        "growth with one more number free that makes the two a class; size of an integral gain that is there",
+        "growth with one more free number that makes the two a class; size of an integral gain that is there",
         "times a standard error",
         least=1.0,
     )

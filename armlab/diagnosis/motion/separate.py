@@ -35,7 +35,7 @@ def confused_parameters(
     found: dict[int, list[int]] = {number: [] for number in fitted}
     for first in range(len(fitted)):
         for second in range(len(fitted)):
-            known = alone[first, first] - alone[first, second] ** 2 / alone[second, second]  # were the second one known
+            known = alone[first, first] - alone[first, second] ** 2 / alone[second, second]  # with the second one known
             if first != second and alone[first, first] > tuning.class_factor**2 * known:
                 found[fitted[first]].append(fitted[second])
     for other in set(columns) - set(fitted):

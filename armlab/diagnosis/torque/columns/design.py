@@ -92,7 +92,7 @@ class DesignMatrix:
         return Block(candidate, variant, filtered_columns(candidate, self.scenes_of(candidate), self.observed, same))
 
     def slope(self, number: int, which: int) -> Array:
-        """Derivative of a block's columns by one of its candidate's shapes, as large as its columns."""
+        """Derivative of a block's columns by a shape parameter of its candidate, of the shape of these columns."""
         block = self.blocks[number]
         if which not in block.slopes:
             block.slopes[which] = self._slope(block, which)

@@ -8,13 +8,11 @@ import numpy as np
 from pydantic import Field
 
 from armlab.common.settings import read_json, validate
+from armlab.common.told import MAX_CLASS_NAMES, MIN_CAUSE_PROBABILITY, MIN_NAME_PROBABILITY
 from armlab.diagnosis.formats import ClassMember, Entry, ParameterEntry
 
 Rank = Literal["named", "class", "cause", "minor", "missed", "below"]
 FACT_RANKS: tuple[Rank, ...] = ("named", "class", "cause", "minor", "missed")  # best first
-MIN_NAME_PROBABILITY = 0.9  # of a name that is stated, and of all names of a class together
-MIN_CAUSE_PROBABILITY = 0.5  # of a cause; what is less probable must not be told
-MAX_CLASS_NAMES = 3
 MAIN_NUMBER = {
     "payload": "mass",
     "torque_gain_error": "gain",
