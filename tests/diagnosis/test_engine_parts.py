@@ -341,3 +341,17 @@ def test_a_direction_that_the_prior_alone_holds_hides_no_other() -> None:
         chances.append(covariance.p_value(values, list(range(2, design.shape[1])), 1e5))
     assert np.log(chances[0]) == pytest.approx(np.log(chances[1]), rel=0.25)
     assert chances[0] < 1e-3
+
+
+def test_a_second_look_adds_what_a_scan_finds_then_and_leaves_what_was_there(design: DesignMatrix) -> None:
+    families = [family for family in library() if family.effect in ("external_contact", "viscous_friction")]
+    quiet = [np.zeros(each.run.position.shape) for each in design.observed.signals]
+    first = design.with_candidates(families, quiet)
+    assert first.scanned_again(lambda effect: quiet).blocks == first.blocks
+    pushed = [each.copy() for each in quiet]
+    pushed[0][200:300, 0] = 1.0
+    again = first.scanned_again(lambda effect: pushed)
+    assert again.blocks[: len(first.blocks)] == first.blocks
+    more = [each.candidate for each in again.blocks[len(first.blocks) :]]
+    assert {(each.effect, each.joint) for each in more} == {("external_contact", 1)}
+    assert more[0].shape == pytest.approx((200 / cases.RATE_HZ, 300 / cases.RATE_HZ), abs=0.2)

@@ -13,8 +13,12 @@ from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.design import DesignMatrix
 from armlab.diagnosis.torque.evidence.added_body import possible_links, with_possible_bodies
 from armlab.diagnosis.torque.evidence.friction_curves import name_friction_curves
-from armlab.diagnosis.torque.evidence.plausibility import unclaim_implausible, withdraw_contradicted
-from armlab.diagnosis.torque.evidence.pruning import prefer_one_body, prune
+from armlab.diagnosis.torque.evidence.plausibility import (
+    unclaim_implausible,
+    withdraw_contradicted,
+    withdraw_implausible,
+)
+from armlab.diagnosis.torque.evidence.pruning import prefer_one_body, prune, scan_what_is_left
 from armlab.diagnosis.torque.names.additions import add_probable, with_likeliest_names
 from armlab.diagnosis.torque.names.expected_parts import claim_expected_parts
 from armlab.diagnosis.torque.predict.prediction import fit_prediction
@@ -47,7 +51,9 @@ BY_TESTS = (
         "The weakest effect that fails a test (`first_failed_test`) leaves until all pass; the search looks again.",
         "testing claims",
     ),
+    Stage(scan_what_is_left, "What passes is taken off, and scans look for gaps, pushes and waves in the rest."),
     Stage(prefer_one_body, "One body that can exist replaces loose masses; bodies that cannot exist leave."),
+    Stage(withdraw_implausible, "Friction with numbers that no arm has gives way to usual friction."),
     Stage(withdraw_contradicted, "A name leaves where as much structure is left at its joint as it explains."),
     Stage(name_friction_curves, "Structure that depends on the velocity of its joint alone is a curve of friction."),
     Stage(possible_links, "Links that are off keep a name only if they are bodies with these numbers."),

@@ -37,8 +37,8 @@ SHAPE_STEP = 1e-4  # of the way between a shape's bounds, for derivatives
 class DesignMatrix:
     """rigid: filtered columns of the base parameters by joint. target: measured less simulated torque,
     filtered, (rows, joints). scenes: one a run, for the present model; calm: the same with the calm motion, for
-    candidates that follow the model. blocks: the candidates' filtered columns. features, banks: of each joint, for
-    surrogates: many of everything, and few of one kind each.
+    candidates that follow the model. blocks: the candidates' filtered columns. families: those that offered them.
+    features, banks: of each joint, for surrogates: many of everything, and few of one kind each.
     """
 
     settings: Settings
@@ -51,6 +51,7 @@ class DesignMatrix:
     scenes: tuple[Scene, ...]
     calm: tuple[Scene, ...]
     blocks: tuple[Block, ...] = ()
+    families: tuple[Family, ...] = ()
     features: tuple[FoldedFeatures, ...] = ()
     banks: tuple[tuple[Features, ...], ...] = ()
 
@@ -118,14 +119,31 @@ class DesignMatrix:
 
         left: what a first fit leaves of each run, (samples, joints), for families that look at it.
         """
-        blocks = [block for family in families for block in self._offered_blocks(family, left)]
-        return replace(self, blocks=tuple(blocks))
+        offered = tuple(families)
+        blocks = [block for family in offered for block in self._offered_blocks(family, left)]
+        return replace(self, blocks=tuple(blocks), families=offered)
 
     def _offered_blocks(self, family: Family, left: Sequence[Array] | None) -> list[Block]:
         arm, scenes = self.simulation.arm, self.scenes
         places = family.candidates(arm, scenes) if left is None else family.scan(arm, scenes, left)
         made = [self.block(each, at) for shapes in places for at, each in enumerate(shapes) if not each.second_name]
         return [block for block in made if is_usable(block)]
+
+    def scanned_again(self, left: Callable[[str], Sequence[Array]]) -> "DesignMatrix":
+        """With more shapes from families that look at what a fit leaves: what was left before hid the best ones.
+
+        left: what a fit leaves of each run without an effect, (samples, joints). Blocks that were there keep their
+        numbers. A place is corrected for what both looks have compared, because the looks of its blocks add up.
+        """
+        known = {_scanned_shape(each.candidate) for each in self.blocks}
+        found = [
+            block
+            for family in self.families
+            if type(family).scan is not Family.scan
+            for block in self._offered_blocks(family, left(family.effect))
+            if block.candidate.looks > 1 and _scanned_shape(block.candidate) not in known
+        ]
+        return replace(self, blocks=(*self.blocks, *found)) if found else self
 
     def with_blocks(self, changed: dict[int, Block]) -> "DesignMatrix":
         """With other columns for some candidates, by their number."""
@@ -142,6 +160,11 @@ class DesignMatrix:
             if block.candidate.follows_model
         }
         return moved.with_blocks(follow)
+
+
+def _scanned_shape(candidate: Candidate) -> tuple[object, ...]:
+    """What a scan chooses: the law, its place and its shape."""
+    return type(candidate), place_of(candidate), candidate.shape
 
 
 def build_design_matrix(

@@ -16,7 +16,8 @@ from armlab.diagnosis.torque.evidence.added_body import (
     predicts_as_well,
 )
 from armlab.diagnosis.torque.evidence.evidence import Evidence, Judge
-from armlab.diagnosis.torque.search.fitted_model import FittedModel
+from armlab.diagnosis.torque.search.fitted_model import FittedModel, follow_model, scan_residual, with_design
+from armlab.diagnosis.torque.search.refine import refine_shapes
 from armlab.diagnosis.torque.search.search import FailedTest, Search, Step
 
 
@@ -74,14 +75,14 @@ def _prune_and_search(belief: Belief, fixed: bool = False) -> Belief:
             break
         again = _remove_failing(searched)
         if not _lasts(passed.model, again.model):
-            return replace(_back_to(passed, again), banned=again.banned)
+            return replace(_back_to(passed, again, "what was found beside it"), banned=again.banned)
         passed = again
     return passed
 
 
-def _back_to(passed: Belief, tried: Belief) -> Belief:
+def _back_to(passed: Belief, tried: Belief, what: str) -> Belief:
     """What passed before, with the log of what was tried."""
-    step = Step("back to what passed before: what was found beside it does not last", passed.model.fit.score)
+    step = Step(f"back to what passed before: {what} does not last", passed.model.fit.score)
     return replace(passed, model=replace(passed.model, steps=(*tried.model.steps, step)))
 
 
@@ -107,6 +108,49 @@ def withdraw(belief: Belief, failed: Mapping[int, FailedTest], before: frozenset
     state = State(tuple(sorted(set(model.state.groups) - groups | back)), model.state.widths)
     less = belief.with_state(state, *steps)
     return _settle_links(_remove_failing(replace(less, banned=groups | before | other_bodies(model))))
+
+
+def look_again(belief: Belief, withdrawn: frozenset[int]) -> Belief:
+    """The belief with what a search finds beside it, where all of that passes and is more likely in the end.
+
+    withdrawn: groups of whose places nothing is looked for.
+    """
+    model, groups = belief.model, belief.model.solver.groups
+    places = {groups[group].place for group in withdrawn}
+    banned = other_bodies(model) | {number for number, each in enumerate(groups) if each.place in places}
+    searched = _search_again(replace(belief, banned=banned), fixed=False)
+    if searched.model.state == model.state:
+        return belief
+    again = _settle_links(_remove_failing(searched))
+    return again if _is_likelier(model, again.model) else belief
+
+
+def scan_what_is_left(belief: Belief) -> Belief:
+    """The belief with what scans find in what it leaves, where that passes, too, and is more likely in the end.
+
+    The first scans looked at what links and plain friction leave: what had no name then can hide a gap or a push. Nor
+    were they, or the last round, made with the links that passed: a gap is crossed where the load of these is zero.
+    """
+    before = belief.model
+    moved = with_design(before, follow_model(before.design, before))
+    design, known = scan_residual(moved), frozenset(range(len(before.design.blocks)))
+    if design is moved.design:
+        return belief
+    model = with_design(moved, design)
+    searched = _search_again(replace(belief, model=model, banned=known), fixed=True)
+    found = searched.model
+    if known.issuperset(found.state.groups):
+        return belief
+    better = refine_shapes(design, found.noise, found.solver, found.state, but=known)
+    if better:
+        searched = replace(searched, model=with_design(found, design.with_blocks(better)))
+    again = _settle_links(_remove_failing(searched))
+    return again if _is_likelier(model, again.model) else _back_to(belief, again, "what scans found beside it")
+
+
+def _is_likelier(before: FittedModel, after: FittedModel) -> bool:
+    """Whether what a search has changed has more evidence, and predicts held-out rows as well."""
+    return after.fit.score > before.fit.score and _lasts(before, after)
 
 
 def _lasts(before: FittedModel, after: FittedModel) -> bool:

@@ -110,6 +110,20 @@ def fit_background(design: DesignMatrix, families: Sequence[Family], seed: int, 
     return replace(rough, state=forward.climb(rough.state, steps))
 
 
+def scan_residual(model: FittedModel) -> DesignMatrix:
+    """The design with more shapes of each scanned effect, from what a model leaves without the effect."""
+    residual, coefficients = model.residual(model.fit), model.coefficients(model.fit)
+
+    def without(effect: str) -> list[Array]:
+        own = np.zeros_like(coefficients)
+        for group in (model.solver.groups[each] for each in model.state.groups):
+            if group.candidate.effect == effect:
+                own[group.columns] = coefficients[group.columns]
+        return _split_by_run(model.design, residual + model.columns.torque_of(own))
+
+    return model.design.scanned_again(without)
+
+
 def with_design(model: FittedModel, design: DesignMatrix) -> FittedModel:
     """The same state and noise on another design, in which its groups have the same numbers."""
     moments, solver = design.solver(model.noise)

@@ -4,7 +4,7 @@ The linear coefficients of the whole model are eliminated, so that only the shap
 local search from the best of the shapes that the family offered.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,10 +42,12 @@ class Profile:
         return 0.5 * float(towards @ np.linalg.pinv(left, rcond=1e-6, hermitian=True) @ towards)
 
 
-def refine_shapes(design: DesignMatrix, noise: Noise, solver: Solver, state: State) -> dict[int, Block]:
-    """Blocks with better shapes for the state's groups that have any, by their number."""
+def refine_shapes(
+    design: DesignMatrix, noise: Noise, solver: Solver, state: State, but: Collection[int] = ()
+) -> dict[int, Block]:
+    """Blocks with better shapes for the state's groups that have any, by their number. but: groups that stay."""
     out = {}
-    for group in state.groups:
+    for group in (each for each in state.groups if each not in but):
         candidate = solver.candidate(group)
         if candidate.shape:
             profile = profile_without(design, noise, solver, state.minus(group))
