@@ -11,9 +11,12 @@ from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.solver import State
 from armlab.diagnosis.torque.diagnose import prepare
+from armlab.diagnosis.torque.evidence.evidence import Judge
+from armlab.diagnosis.torque.names import expected_parts
 from armlab.diagnosis.torque.names.expected_parts import claim_expected_parts
 from armlab.diagnosis.torque.predict.prediction import fit_prediction
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_background
+from armlab.diagnosis.torque.search.search import FailedTest
 from armlab.effects.library import library
 from problem.motion import Motion
 
@@ -54,5 +57,29 @@ def test_a_joint_whose_friction_is_named_gets_no_second_law(nothing_named: Fitte
         if (each.candidate.effect, each.candidate.joint) == ("coulomb_friction", 2)
     )
     named = replace(nothing_named, state=nothing_named.state.plus(own))
-    belief = Belief(named, prediction=fit_prediction(named))
+    evidence = Judge(named, named.state).effects()
+    belief = Belief(named, effects=evidence, prediction=fit_prediction(named))
     assert claim_expected_parts(belief) is belief
+
+
+def test_friction_whose_law_has_numbers_that_nobody_believes_is_claimed_without_the_name_of_that_law(
+    nothing_named: FittedModel,
+) -> None:
+    groups = nothing_named.solver.groups
+    law = next(
+        number
+        for number, each in enumerate(groups)
+        if (each.candidate.effect, each.candidate.joint) == ("nonlinear_viscous_friction", 2)
+    )
+    named = replace(nothing_named, state=nothing_named.state.plus(law))
+    evidence = Judge(named, named.state).effects()[law]
+    doubted = {law: FailedTest("numbers that can be believed", "no arm has them")}
+    belief = Belief(named, present={law: evidence}, prediction=fit_prediction(named))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(expected_parts, "doubtful_names", lambda model, effects: doubted)
+        claimed = claim_expected_parts(belief)
+    assert set(claimed.effects) == {law}
+    assert claimed.present == {}
+    names = [(each.effect, each.joint) for each in claimed.weighed[law]]
+    assert ("viscous_friction", 2) in names
+    assert ("nonlinear_viscous_friction", 2) not in names

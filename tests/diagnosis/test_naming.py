@@ -116,6 +116,13 @@ def test_friction_keeps_its_law_at_a_joint_of_whose_friction_the_simulation_says
     likelier = replace(own, weighed=weighed(0.02, coulomb_friction=0.03, viscous_friction=0.95))
     (found,) = named_claims([likelier], Settings(), plain={2})
     assert (found.effect, [each.effect for each in found.members]) == ("coulomb_friction", ["viscous_friction"])
+    other = replace(own, weighed=weighed(0.95, coulomb_friction=0.03, viscous_friction=0.02))
+    (curve,) = named_claims([other], Settings(), plain={2})
+    assert statement_of(curve) == Statement("name", ("friction_curve",), pytest.approx(0.95))
+    assert curve.parameters == ()
+    beside = [other, replace(own, effect="viscous_friction", weighed=weighed(0.05, viscous_friction=0.95))]
+    kept = {each.effect: statement_of(each).kind for each in named_claims(beside, Settings(), plain={2})}
+    assert kept == {"coulomb_friction": "nothing", "viscous_friction": "name"}
     unlikely = replace(own, weighed=weighed(0.6, coulomb_friction=0.25, stribeck_friction=0.15))
     (nameless,) = named_claims([unlikely], Settings(), plain={1})
     assert (nameless.effect, nameless.probability) == ("unknown", pytest.approx(0.6))

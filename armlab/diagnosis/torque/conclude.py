@@ -51,6 +51,7 @@ from armlab.diagnosis.torque.search.fitted_model import (
 from armlab.diagnosis.torque.search.search import Search
 from armlab.diagnosis.torque.search.surrogate import Structure
 from armlab.diagnosis.tuning import PruningTuning, changed_numbers
+from armlab.effects.contract import UNKNOWN
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.recording import ROLES, Recording, Role
 
@@ -154,7 +155,7 @@ def _assemble(
     notes = {
         "settings": settings,
         "white_errors_at_joints": [joint for joint, taps in enumerate(model.noise.taps, 1) if len(taps) == 1],
-        "unknown": [each.equation for each in claims if each.candidate is None],
+        "unknown": [each.equation for each in claims if each.effect == UNKNOWN.id],
         "in_links": [f"{each.effect}: {each.equation}" for each in claims if each.in_links],
     }
     plain = prediction.plain

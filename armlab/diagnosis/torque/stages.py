@@ -16,7 +16,6 @@ from armlab.diagnosis.torque.evidence.friction_curves import name_friction_curve
 from armlab.diagnosis.torque.evidence.plausibility import (
     unclaim_implausible,
     withdraw_contradicted,
-    withdraw_implausible,
 )
 from armlab.diagnosis.torque.evidence.pruning import prefer_one_body, prune, scan_what_is_left
 from armlab.diagnosis.torque.names.additions import add_probable, with_likeliest_names
@@ -53,7 +52,6 @@ BY_TESTS = (
     ),
     Stage(scan_what_is_left, "What passes is taken off, and scans look for gaps, pushes and waves in the rest."),
     Stage(prefer_one_body, "One body that can exist replaces loose masses; bodies that cannot exist leave."),
-    Stage(withdraw_implausible, "Friction with numbers that no arm has gives way to usual friction."),
     Stage(withdraw_contradicted, "A name leaves where as much structure is left at its joint as it explains."),
     Stage(name_friction_curves, "Structure that depends on the velocity of its joint alone is a curve of friction."),
     Stage(possible_links, "Links that are off keep a name only if they are bodies with these numbers."),
@@ -73,8 +71,12 @@ BY_PROBABILITY = (
         "The model that predicts is chosen on blocks of the runs that identify: names, and what is only present.",
         "fitting the model that predicts",
     ),
-    Stage(claim_expected_parts, "Usual friction and offsets that the prediction needs are claimed.", "stating numbers"),
-    Stage(unclaim_implausible, "Names with numbers that nobody believes stay in the model without a claim."),
+    Stage(
+        unclaim_implausible,
+        "Names with numbers that nobody believes stay in the model without a claim.",
+        "stating numbers",
+    ),
+    Stage(claim_expected_parts, "Friction and offsets that the prediction needs, and no claim holds, are claimed."),
 )
 
 

@@ -15,7 +15,7 @@ from armlab.diagnosis.result import Claim
 from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.evidence.added_body import mass_found_anew
 from armlab.diagnosis.torque.evidence.evidence import Evidence
-from armlab.diagnosis.torque.evidence.pruning import look_again, withdraw
+from armlab.diagnosis.torque.evidence.pruning import withdraw
 from armlab.diagnosis.torque.evidence.unknown import names_contradicted_by_residual, remaining, with_what_is_left
 from armlab.diagnosis.torque.names.intervals import extend_with_shapes
 from armlab.diagnosis.torque.rows.data import Observed
@@ -32,23 +32,6 @@ CONTRADICTED = FailedTest("what is left at the joint", "what is left at its join
 SMALLEST_TORQUE = 1e-12  # N m; less is rounding
 
 
-def withdraw_implausible(belief: Belief) -> Belief:
-    """The belief without laws of friction whose numbers no engineer believes: usual friction takes their place.
-
-    The weakest leaves first, special laws before usual ones. Then the search looks once more.
-
-    Another effect of which that is so stays in the model without a claim, see `unclaim_implausible`. All are kept
-    without the guard `physics_signs`.
-    """
-    withdrawn = frozenset[int]()
-    while doubts := _doubtful_friction(belief):
-        weakest = min(doubts, key=lambda group: _strength(belief.effects[group]))
-        belief = withdraw(belief, {weakest: doubts[weakest]})
-        withdrawn |= {weakest}
-    again = look_again(belief, withdrawn) if withdrawn else belief
-    return belief if _doubtful_friction(again) else again
-
-
 def withdraw_contradicted(belief: Belief) -> Belief:
     """Without names that what is left at their joint contradicts; all are kept without the guard `unknown`."""
     if not belief.model.design.settings.guards.unknown:
@@ -57,20 +40,9 @@ def withdraw_contradicted(belief: Belief) -> Belief:
     while doubtful := names_contradicted_by_residual(belief.effects, belief.left, belief.tuning) - withdrawn:
         withdrawn |= doubtful
         failed = dict.fromkeys(sorted(doubtful), CONTRADICTED)
-        belief = with_what_is_left(withdraw_implausible(withdraw(belief, failed, withdrawn)))
+        belief = with_what_is_left(withdraw(belief, failed, withdrawn))
     wrong = names_contradicted_by_residual(belief.links, belief.left, belief.tuning)
     return replace(belief, links={link: each for link, each in belief.links.items() if link not in wrong})
-
-
-def _strength(evidence: Evidence) -> tuple[bool, float]:
-    """Special laws before usual ones, and of these the one with less evidence."""
-    return evidence.usual, evidence.score
-
-
-def _doubtful_friction(belief: Belief) -> dict[int, FailedTest]:
-    facts = {group: belief.model.candidate(group).facts for group in belief.effects}
-    doubts = doubtful_names(belief.model, belief.effects)
-    return {group: why for group, why in doubts.items() if facts[group].contains or facts[group].usual}
 
 
 def unclaim_implausible(belief: Belief) -> Belief:

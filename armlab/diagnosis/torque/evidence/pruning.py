@@ -110,21 +110,6 @@ def withdraw(belief: Belief, failed: Mapping[int, FailedTest], before: frozenset
     return _settle_links(_remove_failing(replace(less, banned=groups | before | other_bodies(model))))
 
 
-def look_again(belief: Belief, withdrawn: frozenset[int]) -> Belief:
-    """The belief with what a search finds beside it, where all of that passes and is more likely in the end.
-
-    withdrawn: groups of whose places nothing is looked for.
-    """
-    model, groups = belief.model, belief.model.solver.groups
-    places = {groups[group].place for group in withdrawn}
-    banned = other_bodies(model) | {number for number, each in enumerate(groups) if each.place in places}
-    searched = _search_again(replace(belief, banned=banned), fixed=False)
-    if searched.model.state == model.state:
-        return belief
-    again = _settle_links(_remove_failing(searched))
-    return again if _is_likelier(model, again.model) else belief
-
-
 def scan_what_is_left(belief: Belief) -> Belief:
     """The belief with what scans find in what it leaves, where that passes, too, and is more likely in the end.
 

@@ -14,6 +14,7 @@ from armlab.diagnosis.choice import Weights, probabilities
 from armlab.diagnosis.result import Claim, Member, Weighed, WeighedName
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.names.claims import next_experiment
+from armlab.diagnosis.torque.names.findings import statement_of
 from armlab.diagnosis.torque.search.search import FailedTest, Step
 from armlab.diagnosis.tuning import NamingTuning
 from armlab.effects.contract import UNKNOWN
@@ -122,7 +123,39 @@ def named_claims(claims: Sequence[Claim], settings: Settings, plain: Collection[
             out.append(each)
         else:
             out[there] = _together(out[there], each)
-    return tuple(map(_limited, out))
+    return tuple(map(_limited, _with_curves(out, plain)))
+
+
+def _with_curves(claims: Sequence[Claim], plain: Collection[int]) -> Iterator[Claim]:
+    """The claims; friction that is likelier none of the formulas is a curve, where no other of its joint is told."""
+    told = {each.joint for each in claims if _is_friction(each) and statement_of(each).kind != "nothing"}
+    for each in claims:
+        curve = next((other for other in each.members if other.effect == FRICTION_CURVE_FACTS.id), None)
+        if curve is None or each.joint not in plain or each.joint in told or not _is_friction(each):
+            yield each
+        else:
+            told |= {each.joint}
+            yield _as_curve(each, curve.probability)
+
+
+def _as_curve(claim: Claim, probability: float) -> Claim:
+    """A claim of friction by a formula as one of friction by a curve, whose numbers are those of all friction there."""
+    return replace(
+        claim,
+        effect=FRICTION_CURVE_FACTS.id,
+        parameters=(),
+        equation=f"tau_{claim.joint} += F(velocity_{claim.joint})",
+        rivals=(),
+        next_experiment=FRICTION_CURVE_FACTS.experiment,
+        candidate=None,
+        coefficients=None,
+        covariance=None,
+        probability=probability,
+    )
+
+
+def _is_friction(claim: Claim) -> bool:
+    return claim.candidate is not None and claim.candidate.facts.cause == "friction"
 
 
 def lost_names(before: Sequence[Claim], after: Sequence[Claim], settings: Settings) -> Iterator[Step]:
@@ -151,7 +184,7 @@ def _limited(claim: Claim) -> Claim:
 def _named(claim: Claim, settings: Settings, plain: Collection[int]) -> Claim:
     naming, tuning = naming_of(claim.weighed, settings), settings.tuning.naming
     usual = claim.candidate is not None and (claim.candidate.facts.usual or claim.candidate.is_friction)
-    has = claim.candidate is not None and (claim.candidate.facts.usual or claim.candidate.facts.cause == "friction")
+    has = claim.candidate is not None and (claim.candidate.facts.usual or _is_friction(claim))
     if has and claim.evidence.joint + 1 in plain:
         naming = _naming(_given_that_it_is_there(naming.answers, claim), settings)
     identical = [each for each in claim.rivals if each.identical]
@@ -177,7 +210,7 @@ def _named(claim: Claim, settings: Settings, plain: Collection[int]) -> Claim:
 
 def _is_friction_for_sure(claim: Claim, naming: Naming) -> bool:
     """Whether a law of friction is likelier friction of its joint than not, by whatever law."""
-    if claim.candidate is None or claim.candidate.facts.cause != "friction":
+    if not _is_friction(claim):
         return False
     laws = (each for each in naming.answers if each.joint == claim.joint and each.effect != UNKNOWN.id)
     friction = sum(each.probability for each in laws if effect_named(each.effect).cause == "friction")
@@ -192,7 +225,7 @@ def _given_that_it_is_there(answers: Sequence[Member], claim: Claim) -> Iterator
     """
     none = sum(each.probability for each in answers if each.effect == UNKNOWN.id)
     names = [each for each in answers if each.effect != UNKNOWN.id]
-    if claim.candidate is None or claim.candidate.facts.cause != "friction":
+    if not _is_friction(claim):
         yield from (replace(each, probability=each.probability / max(1 - none, 1e-300)) for each in names)
         return
     curve = Member(FRICTION_CURVE_FACTS.id, claim.joint, claim.joints, none)
