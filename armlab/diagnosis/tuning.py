@@ -363,16 +363,10 @@ class LocationTuning:
 
 @dataclass(frozen=True)
 class UnknownTuning:
-    """When structure that is left is a finding, and when it contradicts a name."""
+    """When structure that is left is a finding."""
 
     level: float = tuned(
         0.03, "level of structure without a name, after all surrogates that were tried", "p-value", most=1.0
-    )
-    max_residual_ratio: float = tuned(
-        1.0,
-        "structure above it withdraws the name of the law",
-        "of the error that a law explains",
-        source=REFUTE_SOURCE,
     )
     form_error_share: float = tuned(
         0.25,

@@ -1,17 +1,13 @@
-"""When a name is withdrawn, when what is left is its own form, and what was no push."""
+"""When what is left is the form of a law, and what was no push."""
 
-from collections.abc import Mapping
-
-import engine_cases as cases
 import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.diagnosis.torque.evidence.evidence import Evidence
 from armlab.diagnosis.torque.evidence.pushes import Stretch, reason_no_contact
-from armlab.diagnosis.torque.evidence.unknown import is_form_error, names_contradicted_by_residual
+from armlab.diagnosis.torque.evidence.unknown import is_form_error
 from armlab.diagnosis.torque.search.surrogate import Structure
 from armlab.diagnosis.tuning import Tuning
 
@@ -24,34 +20,6 @@ def _evidence(gain: float, joint: int = 1, usual: bool = False) -> Evidence:
 
 def _left(gain: float, joint: int = 1, p_value: float = 1e-9) -> Structure:
     return Structure(joint, gain, p_value, gain, gain, np.zeros(3), ("velocity_2",))
-
-
-def test_a_law_that_leaves_as_much_as_it_explains_has_the_wrong_name() -> None:
-    effects = {4: _evidence(0.3), 7: _evidence(0.5), 9: _evidence(0.3, joint=0)}
-    assert names_contradicted_by_residual(effects, (_left(0.6),), TUNING) == {4}
-
-
-@pytest.mark.parametrize("left", [_left(0.4), _left(0.6, p_value=0.5), _left(0.6, joint=2)])
-def test_a_name_holds_where_little_or_nothing_sure_is_left_at_its_joint(left: Structure) -> None:
-    assert not names_contradicted_by_residual({4: _evidence(0.3)}, (left,), TUNING)
-
-
-def test_a_name_that_does_not_hold_is_withdrawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two laws that are found in the place of each other would be withdrawn in turn without end."""
-    asked: list[frozenset[int]] = []
-
-    def same_again(claimed: Mapping[int, Evidence], *_: object) -> frozenset[int]:
-        asked.append(asked[0] if asked else frozenset(number for number, each in claimed.items() if not each.usual))
-        assert len(asked) < 10
-        return asked[-1]
-
-    monkeypatch.setattr("armlab.diagnosis.torque.evidence.plausibility.names_contradicted_by_residual", same_again)
-    diagnose(cases.recording(lambda motion, time: 0.05 * motion.velocity**3, seconds=6.0))
-    assert asked[0]
-
-
-def test_friction_that_every_arm_has_keeps_its_name() -> None:
-    assert not names_contradicted_by_residual({4: _evidence(0.3, usual=True)}, (_left(0.6),), TUNING)
 
 
 def test_what_a_named_law_leaves_of_itself_is_no_finding() -> None:

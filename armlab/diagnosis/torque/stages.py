@@ -15,9 +15,9 @@ from armlab.diagnosis.torque.evidence.added_body import possible_links, with_pos
 from armlab.diagnosis.torque.evidence.friction_curves import name_friction_curves
 from armlab.diagnosis.torque.evidence.plausibility import (
     unclaim_implausible,
-    withdraw_contradicted,
 )
 from armlab.diagnosis.torque.evidence.pruning import prefer_one_body, prune, scan_what_is_left
+from armlab.diagnosis.torque.evidence.unknown import with_what_is_left
 from armlab.diagnosis.torque.names.additions import add_probable, with_likeliest_names
 from armlab.diagnosis.torque.names.expected_parts import claim_expected_parts
 from armlab.diagnosis.torque.predict.prediction import fit_prediction
@@ -52,7 +52,7 @@ BY_TESTS = (
     ),
     Stage(scan_what_is_left, "What passes is taken off, and scans look for gaps, pushes and waves in the rest."),
     Stage(prefer_one_body, "One body that can exist replaces loose masses; bodies that cannot exist leave."),
-    Stage(withdraw_contradicted, "A name leaves where as much structure is left at its joint as it explains."),
+    Stage(with_what_is_left, "What is left at each joint is searched for structure, which speaks against names there."),
     Stage(name_friction_curves, "Structure that depends on the velocity of its joint alone is a curve of friction."),
     Stage(possible_links, "Links that are off keep a name only if they are bodies with these numbers."),
 )

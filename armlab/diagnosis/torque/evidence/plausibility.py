@@ -15,8 +15,7 @@ from armlab.diagnosis.result import Claim
 from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.evidence.added_body import mass_found_anew
 from armlab.diagnosis.torque.evidence.evidence import Evidence
-from armlab.diagnosis.torque.evidence.pruning import withdraw
-from armlab.diagnosis.torque.evidence.unknown import names_contradicted_by_residual, remaining, with_what_is_left
+from armlab.diagnosis.torque.evidence.unknown import remaining
 from armlab.diagnosis.torque.names.intervals import extend_with_shapes
 from armlab.diagnosis.torque.rows.data import Observed
 from armlab.diagnosis.torque.search.fitted_model import FittedModel
@@ -28,21 +27,7 @@ from armlab.effects.links import SolidBody
 from armlab.effects.parameters import ParameterValue, parameter_values
 
 NOT_CLAIMED = "present, not claimed"
-CONTRADICTED = FailedTest("what is left at the joint", "what is left at its joint is no less structured")
 SMALLEST_TORQUE = 1e-12  # N m; less is rounding
-
-
-def withdraw_contradicted(belief: Belief) -> Belief:
-    """Without names that what is left at their joint contradicts; all are kept without the guard `unknown`."""
-    if not belief.model.design.settings.guards.unknown:
-        return belief
-    belief, withdrawn = with_what_is_left(belief), frozenset[int]()
-    while doubtful := names_contradicted_by_residual(belief.effects, belief.left, belief.tuning) - withdrawn:
-        withdrawn |= doubtful
-        failed = dict.fromkeys(sorted(doubtful), CONTRADICTED)
-        belief = with_what_is_left(withdraw(belief, failed, withdrawn))
-    wrong = names_contradicted_by_residual(belief.links, belief.left, belief.tuning)
-    return replace(belief, links={link: each for link, each in belief.links.items() if link not in wrong})
 
 
 def unclaim_implausible(belief: Belief) -> Belief:

@@ -96,10 +96,10 @@ def _search_again(belief: Belief, fixed: bool) -> Belief:
     return replace(belief, model=replace(model, state=state, steps=tuple(steps)))
 
 
-def withdraw(belief: Belief, failed: Mapping[int, FailedTest], before: frozenset[int] = frozenset()) -> Belief:
+def withdraw(belief: Belief, failed: Mapping[int, FailedTest]) -> Belief:
     """The belief without some groups, and without what no longer passes; usual friction in the place of special laws.
 
-    failed: why, for each group. before: groups that were withdrawn earlier; nor do they come back.
+    failed: why, for each group. They do not come back.
     """
     model = belief.model
     judge, groups = Judge(model, model.state), frozenset(failed)
@@ -107,7 +107,7 @@ def withdraw(belief: Belief, failed: Mapping[int, FailedTest], before: frozenset
     back = {other for group in groups for other in judge.simpler(group)}
     state = State(tuple(sorted(set(model.state.groups) - groups | back)), model.state.widths)
     less = belief.with_state(state, *steps)
-    return _settle_links(_remove_failing(replace(less, banned=groups | before | other_bodies(model))))
+    return _settle_links(_remove_failing(replace(less, banned=groups | other_bodies(model))))
 
 
 def scan_what_is_left(belief: Belief) -> Belief:

@@ -1,4 +1,4 @@
-"""Structure that the library leaves: findings without a name, and names that it contradicts."""
+"""Structure that the library leaves: findings without a name, and evidence against names."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -139,7 +139,9 @@ def remaining(belief: Belief) -> tuple[Structure, ...]:
 
 
 def with_what_is_left(belief: Belief) -> Belief:
-    """The belief with the structure that surrogates find in what its model leaves."""
+    """The belief with the structure that surrogates find in what its model leaves; none without the guard `unknown`."""
+    if not belief.model.design.settings.guards.unknown:
+        return belief
     return replace(belief, left=predict_residual_structure(belief.model, fit_coloured_noise(belief.model)))
 
 
@@ -185,18 +187,6 @@ def unknown_claim(
         next_experiment=UNKNOWN.experiment,
         depends_on=depends_on,
         weighed=weighed,
-    )
-
-
-def names_contradicted_by_residual(
-    claimed: Mapping[int, Evidence], left: Sequence[Structure], tuning: Tuning
-) -> frozenset[int]:
-    """The groups or links whose names do not hold; friction and offsets, which every arm has, keep theirs."""
-    over = {each.joint: predicted_share(each) for each in left if is_structured(each, tuning)}
-    return frozenset(
-        number
-        for number, each in claimed.items()
-        if not each.usual and over.get(each.joint, 0.0) > tuning.unknown.max_residual_ratio * each.gain
     )
 
 

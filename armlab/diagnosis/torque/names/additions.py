@@ -62,9 +62,7 @@ def add_probable(belief: Belief) -> Belief:
             out = replace(out, unnamed=(*out.unnamed, _unnamed(out.model, group, state, evidence, names)))
         else:
             out = replace(out, nothing=(*out.nothing, names))
-    if added & set(out.effects) and belief.model.design.settings.guards.unknown:
-        return with_what_is_left(out)
-    return out
+    return with_what_is_left(out) if added & set(out.effects) else out
 
 
 def _unnamed(model: FittedModel, group: int, state: State, evidence: Evidence, names: Weighed) -> Claim:
