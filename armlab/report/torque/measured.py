@@ -70,9 +70,9 @@ def friction_cell(account: Account, joint: int, arm: Arm) -> str:
     if row is None:
         return NOTHING
     unit = joint_unit(arm, joint - 1)
-    low, high = (f"{format_fixed(size)} {unit}" for size in row.torque)
-    first, last = (f"{format_number(speed, 2)} {speed_unit(unit)}" for speed in row.speeds)
-    return ", ".join((_together(f"{low} at {first}"), _together(f"{high} at {last}")))
+    low, high = (_together(f"{format_fixed(size)} {unit}") for size in row.torque)
+    first, last = (_together(f"{format_number(speed, 2)} {speed_unit(unit)}") for speed in row.speeds)
+    return f"{low} at {first}, {high} at {last}"
 
 
 def _left_cell(account: Account, joint: int, arm: Arm) -> str:
