@@ -38,6 +38,11 @@ def nothing_named() -> FittedModel:
     return replace(model, state=State((), model.state.widths))
 
 
+def group_at_joint_2(model: FittedModel, effect: str) -> int:
+    groups = [each.candidate for each in model.solver.groups]
+    return next(number for number, each in enumerate(groups) if (each.effect, each.joint) == (effect, 2))
+
+
 def test_friction_that_predictions_need_is_claimed_by_its_likeliest_law_and_no_other(
     nothing_named: FittedModel,
 ) -> None:
@@ -50,12 +55,7 @@ def test_friction_that_predictions_need_is_claimed_by_its_likeliest_law_and_no_o
 
 
 def test_a_joint_whose_friction_is_named_gets_no_second_law(nothing_named: FittedModel) -> None:
-    groups = nothing_named.solver.groups
-    own = next(
-        number
-        for number, each in enumerate(groups)
-        if (each.candidate.effect, each.candidate.joint) == ("coulomb_friction", 2)
-    )
+    own = group_at_joint_2(nothing_named, "coulomb_friction")
     named = replace(nothing_named, state=nothing_named.state.plus(own))
     evidence = Judge(named, named.state).effects()
     belief = Belief(named, effects=evidence, prediction=fit_prediction(named))
@@ -65,12 +65,7 @@ def test_a_joint_whose_friction_is_named_gets_no_second_law(nothing_named: Fitte
 def test_friction_whose_law_has_numbers_that_nobody_believes_is_claimed_without_the_name_of_that_law(
     nothing_named: FittedModel,
 ) -> None:
-    groups = nothing_named.solver.groups
-    law = next(
-        number
-        for number, each in enumerate(groups)
-        if (each.candidate.effect, each.candidate.joint) == ("nonlinear_viscous_friction", 2)
-    )
+    law = group_at_joint_2(nothing_named, "nonlinear_viscous_friction")
     named = replace(nothing_named, state=nothing_named.state.plus(law))
     evidence = Judge(named, named.state).effects()[law]
     doubted = {law: FailedTest("numbers that can be believed", "no arm has them")}

@@ -18,10 +18,10 @@ class Belief:
     """A model, which of its parts have a name, and what it leaves.
 
     effects, links: the evidence for names that hold, by group and by link (from 0); present: for effects of the model
-    that are not claimed. banned: groups for which a search
-    does not look any more. left: structure that the model leaves at each joint. weighed: names of the effects that were
-    added because they are probable, by group; unnamed: findings without a probable name; nothing: names of what may be
-    nothing. prediction: the model that predicts, None before it is fitted.
+    that are not claimed. banned: groups for which a search does not look any more. left: structure that the model
+    leaves at each joint. weighed: names of the effects that were added because they are probable, and of friction
+    whose law has no believable numbers, by group; unnamed: findings without a probable name; nothing: names of what may
+    be nothing. prediction: the model that predicts, None before it is fitted.
     """
 
     model: FittedModel

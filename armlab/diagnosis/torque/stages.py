@@ -13,9 +13,7 @@ from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.design import DesignMatrix
 from armlab.diagnosis.torque.evidence.added_body import possible_links, with_possible_bodies
 from armlab.diagnosis.torque.evidence.friction_curves import name_friction_curves
-from armlab.diagnosis.torque.evidence.plausibility import (
-    unclaim_implausible,
-)
+from armlab.diagnosis.torque.evidence.plausibility import unclaim_implausible
 from armlab.diagnosis.torque.evidence.pruning import prefer_one_body, prune, scan_what_is_left
 from armlab.diagnosis.torque.evidence.unknown import with_what_is_left
 from armlab.diagnosis.torque.names.additions import add_probable, with_likeliest_names

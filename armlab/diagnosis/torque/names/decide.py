@@ -141,17 +141,17 @@ def _with_curves(claims: Sequence[Claim], plain: Collection[int]) -> Iterator[Cl
 def _as_curve(claim: Claim, probability: float) -> Claim:
     """A claim of friction by a formula as one of friction by a curve, whose numbers are those of all friction there."""
     return replace(
-        claim,
+        _without_law(claim),
         effect=FRICTION_CURVE_FACTS.id,
-        parameters=(),
         equation=f"tau_{claim.joint} += F(velocity_{claim.joint})",
-        rivals=(),
         next_experiment=FRICTION_CURVE_FACTS.experiment,
-        candidate=None,
-        coefficients=None,
-        covariance=None,
         probability=probability,
     )
+
+
+def _without_law(claim: Claim) -> Claim:
+    """The claim without the numbers of its law and what resembles it."""
+    return replace(claim, parameters=(), rivals=(), candidate=None, coefficients=None, covariance=None)
 
 
 def _is_friction(claim: Claim) -> bool:
@@ -245,17 +245,12 @@ def _without_name(claim: Claim, naming: Naming, tuning: NamingTuning) -> Claim:
         axis = claim.candidate.facts.axis
         depends_on = (f"{axis}_{joint}",) if axis in MOTION_AXES else ()
     return replace(
-        claim,
+        _without_law(claim),
         effect=UNKNOWN.id,
         joint=joint,
         joints=(joint,),
-        parameters=(),
         equation=f"tau_{joint} += f({', '.join(depends_on) or 'the motion'})",
-        rivals=(),
         next_experiment=UNKNOWN.experiment,
-        candidate=None,
-        coefficients=None,
-        covariance=None,
         depends_on=depends_on,
         in_links=False,
         group=None,
