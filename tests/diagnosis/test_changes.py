@@ -28,6 +28,7 @@ from armlab.diagnosis.changes.comparison import Comparison, compare, look_plainl
 from armlab.diagnosis.changes.friction_level import ALL_FRICTION
 from armlab.diagnosis.changes.numbers import Change, laws_of
 from armlab.diagnosis.changes.pooled import pool_plainly, unite_candidates
+from armlab.diagnosis.result import Rival
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.predict.found_model import model_found
 from armlab.diagnosis.torque.rows.simulation import read_simulation
@@ -146,6 +147,20 @@ def test_a_changed_load_is_a_payload() -> None:
     (load,) = comparison("loaded").findings
     assert (load.effect, load.joint) == ("payload", 3)
     assert [(each.effect, each.joint) for each in load.rivals][-1] == ("inertial_parameter_error", 3)
+
+
+def test_a_change_whose_name_is_not_sure_is_told_by_its_class() -> None:
+    (load,) = comparison("loaded").findings
+    near, far = Rival("encoder_offset", 2, (2,), deficit=1.0), Rival("coulomb_friction", 1, (1,), deficit=4.0)
+    unsure = replace(load, probability=1 / (1 + np.exp(-1) + np.exp(-4)), rivals=(near, far, *load.rivals))
+    assert sum(each.probability for each in unsure.members) == pytest.approx(1)
+    first, _ = comparison_sentences(replace(comparison("loaded"), findings=(unsure,)))
+    assert "this changed: payload at link 3 or encoder offset at joint 2 (mass" in first
+    text = " ".join(" ".join(comparison_lines(replace(comparison("loaded"), findings=(unsure,)))).split())
+    assert "could also be Coulomb friction at joint 1 and inertial parameter error at link 3" in text
+    one_place = replace(load, effect="torque_offset", joint=2, probability=1 / (1 + np.exp(-1)), rivals=(near,))
+    first, _ = comparison_sentences(replace(comparison("loaded"), findings=(one_place,)))
+    assert "torque offset or encoder offset at joint 2 (" in first
 
 
 def test_what_plain_least_squares_sees_beyond_eight_standard_errors_is_never_the_same() -> None:

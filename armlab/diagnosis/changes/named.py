@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from armlab.common.told import MIN_NAME_PROBABILITY
 from armlab.diagnosis.changes.between_runs import scatter_between_runs
 from armlab.diagnosis.changes.change_search import find_rivals, held_out_errors
 from armlab.diagnosis.changes.changes import ChangeGroup, ChangeTable, Tested
@@ -19,7 +20,7 @@ from armlab.diagnosis.changes.numbers import (
 )
 from armlab.diagnosis.changes.pooled import Pooled, is_body
 from armlab.diagnosis.changes.soundness import held_out_gains
-from armlab.diagnosis.result import Rival
+from armlab.diagnosis.result import Member, Rival
 from armlab.diagnosis.torque.columns.columns import place_of
 from armlab.effects.links import INERTIAL_ERROR_FACTS
 from armlab.effects.parameters import ParameterValue, parameter_values
@@ -32,7 +33,7 @@ class NamedChange:
     """One thing that changed. parameters: as changes. changes: the same with levels, where they are known.
 
     gains: share by which the held-out error of each recording falls with it. rms_before, rms_after: held-out, N m (N),
-    at the joint that profits most. probability: of the name among its rivals.
+    at the joint that profits most. probability: of the name among its rivals, and of what no motion tells from it.
     """
 
     effect: str
@@ -50,6 +51,25 @@ class NamedChange:
     probability: float
     rivals: tuple[Rival, ...]
 
+    @property
+    def members(self) -> tuple[Member, ...]:
+        """The names that it may have, the likeliest first; together they have probability 1."""
+        own = Rival(self.effect, self.joint, self.joints)
+        names = (own, *(each for each in self.rivals if not each.identical))
+        return tuple(Member(each.effect, each.joint, each.joints, self.probability * _weight(each)) for each in names)
+
+    @property
+    def told(self) -> tuple[Member, ...]:
+        """The likeliest of them that reach the probability of a name together."""
+        reached = np.cumsum([each.probability for each in self.members])
+        return self.members[: 1 + int(np.argmax(reached >= MIN_NAME_PROBABILITY))]
+
+    @property
+    def not_told(self) -> tuple[Rival, ...]:
+        """What else it could be."""
+        told = {(each.effect, each.joint) for each in self.told}
+        return tuple(each for each in self.rivals if (each.effect, each.joint) not in told)
+
 
 def name_changes(pooled: Pooled, table: ChangeTable, found: Sequence[Tested]) -> tuple[NamedChange, ...]:
     """The changes that were found, with what else each could be, the surest first."""
@@ -65,8 +85,7 @@ def _name(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: T
     joint = int(np.argmax([float(one @ one - two @ two) / each.variance for one, two, each in pairs]))
     counted = float(table.mixed.joints[joint].rows.weights.sum())
     before, after = (float(np.sqrt(part[joint] @ part[joint] / counted)) for part in errors)
-    rivals = find_rivals(table, chosen, tested)
-    weights = np.exp(-np.array([0.0, *(deficit for _, deficit in rivals)]))
+    rivals = tuple(_list_rivals(table, group, find_rivals(table, chosen, tested)))
     changes = tuple(list_changes(pooled, table, found, tested))
     factor = half_width_factor(tested.degrees)
     difference, covariance = between_ends(table, tested)
@@ -95,9 +114,14 @@ def _name(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: T
         gains=held_out_gains(table, tested.group, errors),
         rms_before=before,
         rms_after=after,
-        probability=float(1 / weights.sum()),
-        rivals=tuple(_list_rivals(table, group, rivals)),
+        probability=1 / (1 + sum(_weight(each) for each in rivals if not each.identical)),
+        rivals=rivals,
     )
+
+
+def _weight(rival: Rival) -> float:
+    """How likely a rival is beside the name."""
+    return float(np.exp(-rival.deficit))
 
 
 def _list_rivals(table: ChangeTable, own: ChangeGroup, rivals: Sequence[tuple[int, float]]) -> Iterator[Rival]:

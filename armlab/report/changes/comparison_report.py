@@ -46,7 +46,7 @@ from armlab.diagnosis.settings import Baseline
 from armlab.diagnosis.torque.names.findings import FRICTION
 from armlab.diagnosis.tuning import ComparisonTuning
 from armlab.effects.library import effect_named
-from armlab.effects.words import place_in_words
+from armlab.effects.words import at_place, place_in_words
 from armlab.recordings.identifiable import require_identifiable, require_possible
 from armlab.recordings.load import load_recording
 from armlab.report.account.summary import MAX_WORDS
@@ -59,6 +59,7 @@ from armlab.report.words import (
     PARAMETER_DIGITS,
     effect_in_words,
     format_probability,
+    member_in_words,
     parameter_rows,
     rival_in_words,
 )
@@ -90,7 +91,7 @@ def comparison_sentences(comparison: Comparison) -> tuple[str, str]:
 
 def _leading_phrase(comparison: Comparison, named: NamedChange) -> str:
     """A change with the number that is surest; of friction all laws of the joint together, where they are known."""
-    where = _place_phrase(comparison.arm, named)
+    where = _names_phrase(comparison.arm, named)
     whole = [
         each.ratio
         for each in comparison.changes
@@ -105,13 +106,17 @@ def _leading_phrase(comparison: Comparison, named: NamedChange) -> str:
 
 def change_phrase(arm: Arm, named: NamedChange) -> str:
     """A change with its numbers: in percent where there is a level, else in units."""
-    where, parts = _place_phrase(arm, named), [_amount(each) for each in named.changes]
+    where, parts = _names_phrase(arm, named), [_amount(each) for each in named.changes]
     return f"{where} ({', '.join(parts)})" if parts else f"{where}: {named.equation}"
 
 
-def _place_phrase(arm: Arm, named: NamedChange) -> str:
-    between = "of" if named.joint is None else "at"
-    return f"{effect_in_words(named.effect)} {between} {place_in_words(arm, named.effect, named.joint, named.joints)}"
+def _names_phrase(arm: Arm, named: NamedChange) -> str:
+    """Its name with its place, or the names of its class; a place that all of them share stands once."""
+    places = [place_in_words(arm, each.effect, each.joint, each.joints) for each in named.told]
+    if len(set(places)) > 1:
+        return join_words([member_in_words(arm, each) for each in named.told], "or")
+    names = join_words([effect_in_words(each.effect) for each in named.told], "or")
+    return at_place(arm, names, named.effect, named.joint, named.joints)
 
 
 def _amount(change: Change) -> str:
@@ -177,7 +182,7 @@ def comparison_lines(comparison: Comparison) -> Iterator[str]:
     first, second = comparison_sentences(comparison)
     yield from wrap(f"{comparison.status.upper()}: {first} {second}", LINE_WIDTH)
     for each in comparison.findings:
-        rivals = [rival_in_words(comparison.arm, rival) for rival in each.rivals]
+        rivals = [rival_in_words(comparison.arm, rival) for rival in each.not_told]
         also = f"; it could also be {join_words(rivals)}" if rivals else ""
         text = f"{change_phrase(comparison.arm, each)}: {each.equation}, p {format_probability(each.p_value)}{also}"
         yield from wrap(text, LINE_WIDTH, initial_indent="  ", subsequent_indent="    ")
@@ -216,12 +221,8 @@ def make_comparison_file(comparison: Comparison) -> ComparisonFile:
 
 
 def _finding_entry(each: NamedChange) -> FindingEntry:
-    members = [(each.effect, each.joint, each.probability)]
-    near = [(rival.effect, rival.joint, np.exp(-rival.deficit)) for rival in each.rivals]
-    members += [(effect, joint, float(each.probability * weight)) for effect, joint, weight in near]
-    total = sum(member[2] for member in members)
-    names = tuple(ClassMember(effect=name, joint=joint, probability=share / total) for name, joint, share in members)
-    own_class: dict[str, Any] = {"class": names}
+    members = [ClassMember(effect=one.effect, joint=one.joint, probability=one.probability) for one in each.members]
+    own_class: dict[str, Any] = {"class": tuple(members)}
     return FindingEntry(
         effect=each.effect,
         kind=kind_of_effect(effect_named(each.effect)),
@@ -321,14 +322,14 @@ def _named_table(comparison: Comparison) -> Table:
 def _card(arm: Arm, named: NamedChange, names: Sequence[str]) -> ChangeCard:
     rows = [[one.name, one.value, one.interval, one.unit] for each in named.parameters for one in parameter_rows(each)]
     factors = [f"{format_number(1 + gain)} times in {name}" for name, gain in zip(names, named.gains, strict=True)]
-    rivals = [rival_in_words(arm, each) for each in named.rivals]
+    rivals = [rival_in_words(arm, each) for each in named.not_told]
     texts = (
         f"{named.equation}. Log evidence {named.evidence:.0f}, p-value {format_probability(named.p_value)}.",
         f"Without this change the squared held-out error is larger: {join_words(factors)}.",
         f"It could also be {join_words(rivals)}." if rivals else "Nothing else explains it nearly as well.",
     )
     numbers = Table(["change of", "value", "95 % interval", "unit"], rows, (0, 3), stacked=True)
-    title = _place_phrase(arm, named)
+    title = _names_phrase(arm, named)
     return ChangeCard(f"{title[0].upper()}{title[1:]}", texts, numbers)
 
 
