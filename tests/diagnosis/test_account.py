@@ -1,12 +1,19 @@
 """What is said of a diagnosis: names by their probability, causes by their share, nothing that nobody would miss."""
 
 from dataclasses import replace
+from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
+import engine_cases as cases
 import numpy as np
 import pytest
 
 from armlab.diagnosis.result import Claim, Member, Part, Removal
+from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.torque.columns.design import DesignMatrix
+from armlab.diagnosis.torque.columns.solver import State
+from armlab.diagnosis.torque.diagnose import prepare
 from armlab.diagnosis.torque.names.findings import (
     Statement,
     causes_of,
@@ -17,9 +24,11 @@ from armlab.diagnosis.torque.names.findings import (
     with_minor_ones,
     without_lesser_unknowns,
 )
-from armlab.diagnosis.torque.predict.parts import add_in_order, cause_of, stack_in_units
+from armlab.diagnosis.torque.predict.parts import add_in_order, cause_of, stack_in_units, weigh_claims
+from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_background
 from armlab.effects.contract import UNKNOWN, Effect
-from armlab.effects.library import effect_named
+from armlab.effects.library import effect_named, library
+from armlab.report.account.summary import list_while_short
 
 MISSED = Removal(0, growth=0.5, rms=1.0, torque=10.0, joints=(0, 1))
 HARDLY = Removal(0, growth=0.04, rms=1.0, torque=1.0)
@@ -123,6 +132,30 @@ def test_what_has_no_name_is_a_finding_only_where_it_leads() -> None:
     leading = [part("friction", (0,), 0.6), part("unknown", (1,), 0.3)]
     assert [each.effect for each in without_lesser_unknowns(found, lesser)] == ["coulomb_friction"]
     assert len(without_lesser_unknowns(found, leading)) == 2
+
+
+@pytest.mark.parametrize(("before", "told"), [(1.2, "told"), (1.03, "minor"), (0.99, "none")])
+def test_structure_that_no_model_holds_is_missed_by_what_its_own_test_says(before: float, told: str) -> None:
+    structure = replace(claim(UNKNOWN.id), evidence=SimpleNamespace(rms_before=before, rms_after=1.0))
+    stated = with_minor_ones(stated_findings(weigh_claims(model(), [structure]), joints=3), [])
+    assert [("minor" if each.minor else "told") for each in stated] == ([] if told == "none" else [told])
+
+
+@cache
+def model() -> FittedModel:
+    """Of an arm from which nothing is hidden, with links alone."""
+    design = prepare(cases.recording(), None, Settings(), lambda message: None)
+    assert isinstance(design, DesignMatrix)
+    fitted = fit_background(design, library(), 0, lambda message: None)
+    return FittedModel(fitted.design, fitted.noise, fitted.moments, fitted.solver, State((), (0.0,) * 3))
+
+
+def test_all_causes_come_before_the_places_of_any() -> None:
+    first = "50 % of the error comes from friction at joints 1, 2, 3, 4, 5 and 6"
+    short, longer = "20 % from torque offset", "20 % from torque offset at joints 1, 2 and 3"
+    assert list_while_short(first, [(short, longer)]) == f"{first}, {longer}"
+    both = [("25 % from backlash", "25 % from backlash at joint 2"), (short, longer)]
+    assert list_while_short(first, both) == f"{first}, 25 % from backlash at joint 2, {short}"
 
 
 def test_shares_of_findings_sum_to_that_of_their_cause() -> None:

@@ -28,7 +28,15 @@ from armlab.diagnosis.torque.names.weighing import weigh_effect, weigh_link, wei
 from armlab.diagnosis.torque.predict.fits import joint_fits
 from armlab.diagnosis.torque.predict.found_model import build_model
 from armlab.diagnosis.torque.predict.joint_friction import joint_friction
-from armlab.diagnosis.torque.predict.parts import LINKS, as_found, claim_facts, explain_error, weigh_claims, weigh_parts
+from armlab.diagnosis.torque.predict.parts import (
+    LINKS,
+    as_found,
+    claim_facts,
+    explain_error,
+    is_in_no_model,
+    weigh_claims,
+    weigh_parts,
+)
 from armlab.diagnosis.torque.predict.prediction import (
     Prediction,
     choose_smoothing,
@@ -180,7 +188,10 @@ def _assemble(
     parts = explain_error(prediction.model, observed, claims, (start, final), floor)
     errors = {each.joint - 1: each.after for each in fits}
     parts = tuple(replace(each, removal=as_found(each.removal, errors, observed)) for each in parts)
-    claims = tuple(replace(each, removal=as_found(each.removal, errors, observed)) for each in claims)
+    claims = tuple(
+        each if is_in_no_model(each) else replace(each, removal=as_found(each.removal, errors, observed))
+        for each in claims
+    )
     claims = with_minor_ones(claims, parts)
     unnamed = _unnamed_gain(fits, tuning.pruning) if not claims else None
     status: Status = "mismatch" if claims else "none" if unnamed is None else "inconclusive"

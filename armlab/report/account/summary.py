@@ -93,14 +93,13 @@ class _Writer:
         share = min(round(100 * first.share), most)
         is_alone = len(self.account.causes) > 1 and not others and share == 100
         amount = "More than 99" if is_alone else "Less than 1" if share < 1 else str(share)
-        sentence = f"{amount} % of the error comes from {self.cause_in_words(first)}"
-        for each in others:
-            names = (self.cause_in_words(each), cause_name(each, self.account.findings_of(each)))
-            tried = [f"{sentence}, {100 * each.share:.0f} % from {name}" for name in names]
-            fitting = [one for one in tried if len(one.split()) <= MAX_FIRST_WORDS]
-            if not fitting:
-                break
-            sentence = fitting[0]
+        shares = [f"{100 * each.share:.0f} % from" for each in others]
+        names = [cause_name(each, self.account.findings_of(each)) for each in others]
+        forms = [
+            (f"{of} {name}", f"{of} {self.cause_in_words(each)}")
+            for of, name, each in zip(shares, names, others, strict=True)
+        ]
+        sentence = list_while_short(f"{amount} % of the error comes from {self.cause_in_words(first)}", forms)
         unnamed = open_share(self.account)
         longer = f"{sentence}; {100 * unnamed:.0f} % is unnamed"
         if unnamed > 1 - STATED_SHARE and len(longer.split()) <= MAX_FIRST_WORDS:
@@ -162,6 +161,24 @@ class _Writer:
         fits = [each for each in self.diagnosis.fit if each.joint - 1 in joints]
         best = max(fits, key=lambda each: start[each.joint - 1] / max(each.after, 1e-300))
         return best, float(start[best.joint - 1])
+
+
+def list_while_short(first: str, others: Sequence[tuple[str, str]]) -> str:
+    """As many parts as MAX_FIRST_WORDS allow, then as many of them as these allow in their longer form.
+
+    others: a short and a longer form of each.
+    """
+
+    def is_short(parts: Sequence[str]) -> bool:
+        return len(" ".join(parts).split()) <= MAX_FIRST_WORDS
+
+    parts = [first, *(short for short, _ in others)]
+    while len(parts) > 1 and not is_short(parts):
+        parts.pop()
+    for number, (_, longer) in enumerate(others[: len(parts) - 1], 1):
+        tried = [*parts[:number], longer, *parts[number + 1 :]]
+        parts = tried if is_short(tried) else parts
+    return ", ".join(parts)
 
 
 def cause_name(cause: StatedCause, own: Sequence[StatedFinding]) -> str:

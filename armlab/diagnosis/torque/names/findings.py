@@ -10,7 +10,7 @@ from typing import Literal
 
 from armlab.common.told import MAX_CLASS_NAMES, MIN_CAUSE_PROBABILITY, MIN_NAME_PROBABILITY
 from armlab.diagnosis.result import Claim, Member, Part
-from armlab.diagnosis.torque.predict.parts import UNKNOWN_CAUSE, cause_of
+from armlab.diagnosis.torque.predict.parts import UNKNOWN_CAUSE, cause_of, is_in_no_model
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 
@@ -154,6 +154,8 @@ def with_minor_ones(claims: Sequence[Claim], parts: Sequence[Part]) -> tuple[Cla
     for part in parts:
         if part.removal is not None and part.removal.is_minor:
             _mark(out, part.claims)
+    alone = [number for number, each in enumerate(claims) if is_in_no_model(each)]
+    _mark(out, [each for each in alone if (removal := claims[each].removal) is not None and removal.is_minor])
     places: dict[tuple[bool, int | None], list[int]] = {}
     for number, claim in enumerate(out):
         if not claim.minor:

@@ -51,9 +51,10 @@ def weigh_parts(model: FittedModel, claims: Sequence[Claim]) -> tuple[Part, ...]
 
 
 def weigh_claims(model: FittedModel, claims: Sequence[Claim]) -> tuple[Claim, ...]:
-    """The claims with what the removal of each alone costs, beside the other claims at its place; None for an unknown.
+    """The claims with what the removal of each alone costs, beside the other claims at its place.
 
     What the model holds of the same cause at the same place without a claim is taken away before: it would hide it.
+    What is in no model costs what its own test says.
     """
     return _Parts(model, tuple(claims)).claims_weighed()
 
@@ -119,6 +120,8 @@ class _Parts:
                 out[number] = replace(self.claims[number], removal=removal)
         widths = self.model.state.widths
         for number, claim in enumerate(self.claims):
+            if is_in_no_model(claim):
+                out[number] = replace(claim, removal=self._removal_by_test(claim))
             if claim.in_links and widths is not None:
                 less = tuple(0.0 if claim.joint == link else width for link, width in enumerate(widths, 1))
                 without, last = State(self.model.state.groups, less), claim.joint or self.model.columns.joints
@@ -152,6 +155,11 @@ class _Parts:
     def _removal_at(self, joint: int, present: State, without: State) -> Removal:
         before, after = self._rms(joint, without), self._rms(joint, present)
         return Removal(joint, before / max(after, 1e-300) - 1, after, float(self._rows_and_units[1][joint]))
+
+    def _removal_by_test(self, claim: Claim) -> Removal:
+        assert claim.joint is not None
+        joint, after = claim.joint - 1, max(claim.evidence.rms_after, 1e-300)
+        return Removal(joint, claim.evidence.rms_before / after - 1, after, float(self._rows_and_units[1][joint]))
 
     def _rms(self, joint: int, state: State) -> float:
         residual = self.model.residual_at(joint, self.model.solver.fit(state))
@@ -205,6 +213,11 @@ class _Parts:
         if not weights.any():
             weights[:] = 1.0
         return [float(each) for each in fall * weights / weights.sum()]
+
+
+def is_in_no_model(claim: Claim) -> bool:
+    """Whether a finding is structure that a surrogate alone knows."""
+    return claim.effect == UNKNOWN.id and not claim.unnamed
 
 
 def _groups_of(claim: Claim) -> tuple[int, ...]:
