@@ -23,7 +23,7 @@ PAYLOAD_FACTS = Effect(
     "a body carried by a link",
     (Parameter("mass", "kg", positive=True), *PLACE_PARAMETERS),
     sentence="The arm carries a load that {model} does not have",
-    figures="{mass} at {centre} of {frame}",
+    figures="{mass} at {centre} from {frame}",
     law=r"\Delta\tau = Y_l(q, \dot q, \ddot q) \; \phi(\text{mass}, \text{centre}, \text{inertia})",
     where="link",
     experiment="repeat the motion without the payload",

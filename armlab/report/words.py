@@ -205,6 +205,11 @@ def format_share(value: float) -> str:
     return "below 0.1 %" if 0 <= value < 0.001 else f"{100 * value:.1f} %"
 
 
+def format_percent(value: float) -> str:
+    """A share in whole percent, with one digit below that: 12 %, 0.4 %."""
+    return f"{100 * value:.0f} %" if value >= 0.01 else f"{format_number(100 * value, 1)} %"
+
+
 def format_growth(before: float, after: float) -> str:
     """`42 times as large` of an error without a finding, before, and with it, after."""
     return f"{format_number(before / max(after, 1e-300), 3 if before < 2 * after else 2)} times as large"

@@ -26,6 +26,7 @@ from armlab.common.report.charts import (
     MEASURED_LOOK,
     REFITTED_LOOK,
 )
+from armlab.common.report.page import keep_units
 from armlab.diagnosis.result import Diagnosis, Member, Part, Rival, Unexplained
 from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.effects.contract import Effect
@@ -34,6 +35,7 @@ from armlab.effects.parameters import ParameterValue
 from armlab.effects.timing import TimeDelay
 from armlab.recordings.load import load_recording
 from armlab.report.account.account import account_of
+from armlab.report.account.next_steps import next_steps
 from armlab.report.torque import write
 from armlab.report.torque.content import error_note, finding_details, left_table
 from armlab.report.torque.gallery import draw_gallery
@@ -158,9 +160,9 @@ def test_the_verdict_says_where_the_error_comes_from_how_large_it_is_and_what_is
     browser: Any, address: str
 ) -> None:
     page, _ = opened(browser, address, 1200)
-    verdict = page.locator(".verdict").inner_text()
+    verdict = page.locator(".verdict").inner_text().replace("\N{NO-BREAK SPACE}", " ")
     assert re.match(r"[\w ]*\d+ % of the error comes from ", verdict)
-    gain = r"falls most at [^:]+: from [\d.]+ \(simulation as given\) to [\d.]+ N m, \d+ % of its torque\."
+    gain = r"falls most at [^:]+: from [\d.]+ \(simulation as given\) to [\d.]+ N m, [\d.]+ % of its torque\."
     assert re.search(gain, verdict)
     page.close()
 
@@ -192,6 +194,8 @@ def test_the_story_stands_beside_the_arm_on_a_wide_screen_and_above_it_on_a_phon
         story, arm = (page.locator(each).first.bounding_box() for each in (".verdict", ".beside svg"))
         assert (arm["x"] > story["x"] + story["width"] and arm["y"] < story["y"] + story["height"]) == is_beside
         assert story["width"] <= 44 * 16
+        steps, causes = (page.locator(each).first.bounding_box() for each in ("#next", ".front table"))
+        assert (steps["y"] > causes["y"]) == is_beside  # on a phone the table is long
         page.close()
 
 
@@ -279,10 +283,32 @@ def test_the_first_screen_has_a_row_a_joint_with_its_friction_units_and_interval
     (level,) = claim.parameters
     assert claim.joint is not None
     assert re.match(r"[\d.]+\sN\sm\sat\s[\d.]+\srad/s, [\d.]+\sN\sm\sat", table.rows[claim.joint - 1][1])
-    assert re.match(r"\d+\s%,\s[\d.]+\sN\sm", table.rows[claim.joint - 1][-1])
+    assert re.match(r"[\d.]+\s%,\s[\d.]+\sN\sm", table.rows[claim.joint - 1][-1])
     cell = table.rows[claim.joint - 1][2]
     assert cell.startswith(format_measured(level).replace(" ", "\N{NO-BREAK SPACE}"))
     assert re.match(r"\d[\d.]*\sN\sm\s\([\d.]+\sto\s[\d.]+\)", cell)
+
+
+def test_friction_beside_the_findings_of_a_joint_is_named_so_that_they_are_not_taken_for_all_of_it(
+    found: Diagnosis,
+) -> None:
+    named = [each for each in found.claims if each.effect != "viscous_friction"]
+    table = joint_table(replace(found, claims=tuple(named), parts=()))
+    place = table.headings.index("Other")
+    assert [row[place] for row in table.rows] == ["also, small or not sure, viscous friction"] * 3
+    assert "Other" not in joint_table(found).headings
+
+
+def test_no_line_breaks_between_a_number_and_its_unit() -> None:
+    text = "5.3 N m (joint 2) at 0.41 rad/s, 2 kg at (−30, 173, 60) mm of link 3 in 3 stretches, 12 % of 4 m"
+    kept = "5.3~N~m (joint 2) at 0.41~rad/s, 2~kg at (−30,~173,~60)~mm of link 3 in 3 stretches, 12~% of 4~m"
+    assert keep_units(text).replace("\N{NO-BREAK SPACE}", "~") == kept
+
+
+def test_what_to_do_next_names_the_joint_in_its_sentence(found: Diagnosis) -> None:
+    spring = replace(found.claims[0], effect="cable_stiffness", joint=2, joints=(2,), rivals=(Rival("payload", 2),))
+    alone = replace(found, claims=(spring,), parts=())
+    assert next_steps(alone, account_of(alone)) == (f"Move j1{HOSTILE} slowly over its full range in both directions.",)
 
 
 def test_the_table_of_joints_is_written_for_a_paper(
@@ -322,7 +348,7 @@ def test_a_payload_is_told_by_mass_and_centre_in_the_frame_of_its_joint(found: D
     )
     claim = replace(found.claims[0], effect="payload", joint=1, joints=(1,), parameters=numbers)
     (sentence,) = body_sentences(replace(found, claims=(claim,), parts=()))
-    load = "2.00 kg (1.998 to 2.003) at (0, 20, 60) mm of j0"
+    load = "2.00 kg (1.998 to 2.003) at (0, 20, 60) mm from j0"
     assert sentence.startswith(f"The arm carries a load that the simulation does not have: {load}")
 
 
@@ -441,7 +467,7 @@ def test_an_unknown_is_shown_with_its_surrogate_over_what_it_depends_on_and_mark
     assert "surrogate" in texts["figures/finding1_unknown.svg"]
     assert "time from the start of the run, s" in texts["figures/finding1_unknown.svg"]
     assert palette.PURPLE in texts["figures/arm.svg"]
-    first = f"40 % of the error comes from something without a name at {escape(f'j1{HOSTILE}')}"
+    first = f"40\N{NO-BREAK SPACE}% of the error comes from something without a name at {escape(f'j1{HOSTILE}')}"
     assert first in re.sub(r"</?a\b[^>]*>", "", texts["report.html"])
 
 

@@ -46,7 +46,7 @@ SENTENCES = {
     "stiffness 0.500 N m/rad (0.4 to 0.6)",
     "cable_stiffness": "The simulation lacks cable stiffness at joint 2",
     "payload": (
-        "The arm carries a load that the simulation does not have: 0.500 kg (0.4 to 0.6) at (0, 20, 60) mm of joint 2"
+        "The arm carries a load that the simulation does not have: 0.500 kg (0.4 to 0.6) at (0, 20, 60) mm from joint 2"
     ),
     "inertial_parameter_error": (
         "The mass, centre of mass or inertia of link 2 differs from that in the simulation: mass 0.500 kg (0.4 to 0.6)"
@@ -144,7 +144,7 @@ def test_friction_that_acts_in_one_direction_alone_is_no_doubtful_friction() -> 
 def test_a_load_of_negative_mass_is_called_less_mass() -> None:
     load = with_numbers("payload", mass=(-0.5, (-0.6, -0.4)))
     assert finding_sentence(load, SIMULATION) == (
-        "The arm has less mass than the simulation: 0.500 kg (0.4 to 0.6) at (0, 20, 60) mm of joint 2"
+        "The arm has less mass than the simulation: 0.500 kg (0.4 to 0.6) at (0, 20, 60) mm from joint 2"
     )
     assert finding_in_words(ARM, load) == "less mass than modelled at link 2"
 
@@ -166,7 +166,7 @@ def test_joints_and_links_are_named_as_the_robot_file_does() -> None:
     named = Simulation("nominal", arm, None)
     coupling = finding_sentence(claim("joint_coupling"), named)
     assert coupling == "The simulation lacks joint coupling at shoulder_lift from shoulder_pan"
-    assert finding_sentence(claim("payload"), named).endswith("at (0, 20, 60) mm of shoulder_lift")
+    assert finding_sentence(claim("payload"), named).endswith("at (0, 20, 60) mm from shoulder_lift")
     assert "of the link of shoulder_lift differs" in finding_sentence(claim("inertial_parameter_error"), named)
 
 

@@ -75,7 +75,8 @@ def test_predict_meets_the_recorded_torque_and_writes_what_it_predicts(recording
     cutoff = format_number(Model.load(tmp_path / "out" / "model.yaml").cutoff_hz)
     assert text.startswith(f"errors of torque filtered below {cutoff} Hz:\n")
     assert re.search(r"run-1.csv: 0\.\d+ % in all, [\d.]+ % of torque as recorded", text)
-    assert f"both filtered below {cutoff} Hz" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert f"both filtered below {cutoff}\N{NO-BREAK SPACE}Hz" in page
     predicted = pd.read_csv(tmp_path / "torques" / "run-1.csv.predicted.csv")
     recorded = pd.read_csv(recording / "run-1.csv")
     inner = slice(int(RATE_HZ), -int(RATE_HZ))

@@ -4,6 +4,7 @@ A template lies in the folder `templates` of the package that writes its page; i
 """
 
 import base64
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -19,6 +20,12 @@ from armlab.common.report.glossary import Glossary, word_anchor
 
 if TYPE_CHECKING:  # matplotlib is loaded by those who draw
     from matplotlib.figure import Figure
+
+
+NUMBER_WITH_UNIT = re.compile(
+    r"(?:\((?:−?[\d.]+, )+−?[\d.]+\)|\d) "  # a point, or the end of a number
+    r"(?:N m s/rad|N m/rad|N s/m|N m|N|kg m²|kg m|kg|mrad|rad/s|rad|deg|mm|m/s|ms|m|s|Hz|A|V|W|%)(?![\w/])"
+)
 
 
 @dataclass(frozen=True)
@@ -63,7 +70,7 @@ def _environment(package: str) -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=False,
     )
-    environment.filters.update(prose=_prose, anchor=word_anchor)
+    environment.filters.update(prose=_prose, anchor=word_anchor, keep_units=keep_units)
     environment.globals.update(palette=palette)
     return environment
 
@@ -82,9 +89,14 @@ def _prose(context: Context, text: str) -> Markup:
     return Markup("").join(shown)
 
 
+def keep_units(text: str) -> str:
+    """The text, in which no line breaks between a number and its unit."""
+    return NUMBER_WITH_UNIT.sub(lambda found: found[0].replace(" ", "\N{NO-BREAK SPACE}"), text)
+
+
 def _link_words(text: str, glossary: Glossary) -> Markup:
     link = Markup('<a class="word" href="#{}" title="{}">{}</a>')
-    pieces = glossary.split(text)
+    pieces = glossary.split(keep_units(text))
     return Markup("").join(
         link.format(word_anchor(word), glossary.used[word], piece) if word else escape(piece) for piece, word in pieces
     )

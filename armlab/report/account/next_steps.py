@@ -46,6 +46,9 @@ def _steps(text: str, own: Sequence[StatedFinding], diagnosis: Diagnosis, accoun
         place = "" if not joints else links_in_words(arm, joints) if is_link else joints_in_words(arm, joints)
         variables = own[0].claim.depends_on if own[0].claim.effect == UNKNOWN.id else ()
         of = f"{place}{f', by {variables_in_words(arm, variables)}' if variables else ''}"
+        own_place = "the link" if is_link else "the joint"
+        if len(joints) == 1 and not variables and own_place in text:
+            text, of = text.replace(own_place, place), ""
         yield f"{text[0].upper()}{text[1:]}{f' ({of})' if of else ''}."
 
 

@@ -21,6 +21,7 @@ from armlab.report.words import (
     compared_in_words,
     effect_in_words,
     format_fixed,
+    format_percent,
     is_negative_load,
     is_of_unknown_links,
     joint_unit,
@@ -66,7 +67,7 @@ def _rest(account: Account, diagnosis: Diagnosis) -> str:
     size = f"{format_fixed(worst.rms)} {joint_unit(arm, worst.joint - 1)}"
     usual = "as real arms leave" if worst.usual else "more than real arms leave"
     where = f"{joint_in_words(arm, worst.joint)}, {size}"
-    return f"What is left is at most {100 * worst.share_of_torque:.0f} % of the torque ({where}), {usual}."
+    return f"What is left is at most {format_percent(worst.share_of_torque)} of the torque ({where}), {usual}."
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,12 +100,10 @@ class _Writer:
             (f"{of} {name}", f"{of} {self.cause_in_words(each)}")
             for of, name, each in zip(shares, names, others, strict=True)
         ]
-        sentence = list_while_short(f"{amount} % of the error comes from {self.cause_in_words(first)}", forms)
         unnamed = open_share(self.account)
-        longer = f"{sentence}; {100 * unnamed:.0f} % is unnamed"
-        if unnamed > 1 - STATED_SHARE and len(longer.split()) <= MAX_FIRST_WORDS:
-            sentence = longer
-        return f"{sentence}."
+        if unnamed > 1 - STATED_SHARE:
+            forms.append((f"{100 * unnamed:.0f} % is unnamed",) * 2)
+        return f"{list_while_short(f'{amount} % of the error comes from {self.cause_in_words(first)}', forms)}."
 
     def cause_in_words(self, cause: StatedCause) -> str:
         """The cause with its place: by its name where its findings have one."""
@@ -147,7 +146,7 @@ class _Writer:
         arm, unit = self.diagnosis.simulation.arm, joint_unit(self.diagnosis.simulation.arm, fit.joint - 1)
         left = next((each for each in self.account.left if each.joint == fit.joint), None)
         of = "torque" if unit == "N m" else "force"
-        share = "" if left is None else f", {100 * left.share_of_torque:.0f} % of its {of}"
+        share = "" if left is None else f", {format_percent(left.share_of_torque)} of its {of}"
         falls = "falls most" if fit.after < before else "does not fall"
         return (
             f"On held-out data the error {falls} at {joint_in_words(arm, fit.joint)}: from {format_fixed(before)} "
@@ -155,11 +154,11 @@ class _Writer:
         )
 
     def _largest_fall(self) -> tuple[JointFit, float]:
-        """The joint of a finding at which the error falls most, and the error that it starts at."""
+        """The joint of a finding at which the error falls by most N m (N), and the error that it starts at."""
         start = errors_at_start(self.diagnosis)
         joints = {each.claim.evidence.joint for each in self.account.findings}
         fits = [each for each in self.diagnosis.fit if each.joint - 1 in joints]
-        best = max(fits, key=lambda each: start[each.joint - 1] / max(each.after, 1e-300))
+        best = max(fits, key=lambda each: start[each.joint - 1] - each.after)
         return best, float(start[best.joint - 1])
 
 

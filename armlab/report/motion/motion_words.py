@@ -97,7 +97,7 @@ def _places(arm: Arm, findings: Sequence[ServoFinding]) -> str:
 
 
 def _replay_sentence(diagnosis: MotionDiagnosis) -> str:
-    """The joint whose replay gains most, or is worst where there is nothing to compare with."""
+    """The joint whose replay error falls by most, or is largest where there is nothing to compare with."""
     if not diagnosis.errors:
         return ""
     arm = diagnosis.simulation.arm
@@ -108,7 +108,7 @@ def _replay_sentence(diagnosis: MotionDiagnosis) -> str:
     if diagnosis.status == "none":
         worst = max(diagnosis.errors, key=lambda each: each.replay_after)
         return f"Its largest replay error is {1e3 * worst.replay_after:.3g} mrad ({joint_in_words(arm, worst.joint)})."
-    best = max(diagnosis.errors, key=lambda each: (each.replay_before or 0.0) / max(each.replay_after, 1e-300))
+    best = max(diagnosis.errors, key=lambda each: (each.replay_before or 0.0) - each.replay_after)
     before, after = 1e3 * (best.replay_before or 0.0), 1e3 * best.replay_after
     falls = "falls most" if after < before else "does not fall"
     return (

@@ -134,12 +134,12 @@ def _cause_size(diagnosis: Diagnosis, cause: StatedCause) -> str:
 
 
 def _how_sure(own: Sequence[StatedFinding]) -> str:
-    """The probability of the least and of the most certain finding of a cause, and whether their names are certain."""
+    """The probability of the least certain finding of a cause, and whether their names are certain."""
     chances = sorted(each.statement.probability for each in own)
-    ends = dict.fromkeys(format_chance(each) for each in (chances[0], chances[-1]))
+    least, most = (format_chance(each) for each in (chances[0], chances[-1]))
     is_sure = all(each.statement.kind == "name" for each in own)
     doubt = "" if is_sure else ", law not certain" if len(own) == 1 else ", not each law certain"
-    return f"{' to '.join(ends)}{doubt}"
+    return f"{least}{'' if least == most else ' or more'}{doubt}"
 
 
 def setup_part(diagnosis: Diagnosis) -> SetupPart | None:
@@ -332,7 +332,7 @@ def _motion_may_tell(claim: Claim) -> bool:
 
 def _export_text(diagnosis: Diagnosis) -> str:
     if diagnosis.simulation.inertial is None or diagnosis.is_plain:
-        return "For a simulator give the robot file nominal `links` first: it takes no base parameters alone."
+        return "A simulator needs masses of links: give the robot file nominal `links`, and diagnose again."
     missing = dict.fromkeys(claim.effect for claim in diagnosis.claims if not _has_place_in_simulator(claim))
     lost = f" That has no place for {join_words([effect_in_words(each) for each in missing])}." if missing else ""
     return f"Where a simulator needs it: `armlab model export model.yaml model.xml` writes MJCF.{lost}"

@@ -20,6 +20,7 @@ from armlab.report.words import (
     effect_in_words,
     format_fixed,
     format_measured,
+    format_percent,
     is_doubtful,
     is_of_unknown_links,
     joint_unit,
@@ -29,7 +30,7 @@ from problem.arm import Arm
 from problem.joint_words import joint_in_table, joint_in_words, joints_in_words
 
 OWN_COLUMN: tuple[Effect, ...] = (COULOMB_FACTS, VISCOUS_FACTS, ROTOR_INERTIA_FACTS)
-NOTHING, OPTIONAL = "–", ("All friction", "Other", "Left, of the torque")
+NOTHING, OPTIONAL = "–", ("All friction", "Other", "Left unexplained")
 
 
 def joint_table(diagnosis: Diagnosis) -> Table:
@@ -42,22 +43,27 @@ def joint_table(diagnosis: Diagnosis) -> Table:
     rows = list[list[str]]()
     for number in range(1, len(arm) + 1):
         own = [each for each in found if each.claim.joint == number]
-        cells = _cells(own, columns, diagnosis.simulation)
-        row = [
-            joint_in_table(arm, number),
-            friction_cell(account, number, arm),
-            *cells,
-            _left_cell(account, number, arm),
-        ]
-        rows.append(row)
+        friction, (*cells, other) = friction_cell(account, number, arm), _cells(own, columns, diagnosis.simulation)
+        if friction != NOTHING and (more := _more_friction(diagnosis, number, own)):
+            other = more if other == NOTHING else f"{other}; {more}"
+        rows.append([joint_in_table(arm, number), friction, *cells, other, _left_cell(account, number, arm)])
     whole = [each for each in found if each.claim.joint is None]
     if whole:
         rows.append(["whole robot", NOTHING, *_cells(whole, columns, diagnosis.simulation), NOTHING])
-    headings = ["joint", "All friction", *map(_heading, columns), "Other", "Left, of the torque"]
+    headings = ["joint", "All friction", *map(_heading, columns), "Other", "Left unexplained"]
     shown = [place for place, heading in enumerate(headings) if heading not in OPTIONAL or _is_used(rows, place)]
     texts = tuple(at for at, place in enumerate(shown) if headings[place] in ("All friction", "Other"))
     table = [[row[place] for place in shown] for row in rows]
     return Table([headings[place] for place in shown], table, texts, stacked=True)
+
+
+def _more_friction(diagnosis: Diagnosis, joint: int, own: Sequence[StatedFinding]) -> str:
+    """What all friction of a joint has beside its findings, so that these are not taken for the whole."""
+    assert diagnosis.model is not None
+    laws = [each for each in diagnosis.model.structure.components if each.is_friction_of(joint)]
+    told = {each.claim.effect for each in own}
+    names = dict.fromkeys(effect_in_words(each.effect) for each in laws if each.effect not in told)
+    return f"also, small or not sure, {join_words(list(names))}" if names else ""
 
 
 def _is_used(rows: Sequence[Sequence[str]], place: int) -> bool:
@@ -81,7 +87,7 @@ def _left_cell(account: Account, joint: int, arm: Arm) -> str:
         if each.joint == joint:
             usual = "" if each.usual else ", unusual"
             size = f"{format_number(each.rms)} {joint_unit(arm, joint - 1)}"
-            return _together(f"{100 * each.share_of_torque:.0f} %, {size}{usual}")
+            return _together(f"{format_percent(each.share_of_torque)}, {size}{usual}")
     return NOTHING
 
 

@@ -22,6 +22,7 @@ from armlab.report.words import (
     finding_in_words,
     format_gap,
     format_growth,
+    format_percent,
     format_probability,
     format_share,
     is_excess,
@@ -122,7 +123,7 @@ def _joint_lines(diagnosis: Diagnosis, account: Account) -> Iterator[str]:
     for joint in joints:
         own = [each for each in account.findings if each.claim.joint == joint]
         name = shorten_name(joint_in_table(arm, joint))
-        left = next((f"{100 * each.share_of_torque:.0f} %" for each in account.left if each.joint == joint), NOTHING)
+        left = next((format_percent(each.share_of_torque) for each in account.left if each.joint == joint), NOTHING)
         found = "no torque" if joint - 1 in arm.unmeasured else _found_in_words(own, diagnosis.simulation)
         rows.append([name, friction_cell(account, joint, arm), left, found])
     whole = [each for each in account.findings if each.claim.joint is None]
@@ -132,9 +133,8 @@ def _joint_lines(diagnosis: Diagnosis, account: Account) -> Iterator[str]:
     widths = [max(len(row[column]) for row in rows) for column in range(3)]
     for row in rows:
         start = "  ".join(cell.ljust(width) for cell, width in zip(row[:3], widths, strict=True)) + "  "
-        lines = wrap(row[3], max(LINE_WIDTH - len(start) - 2, MIN_CELL)) or [NOTHING]
-        if len(lines) > MAX_CELL_LINES:
-            lines = [*lines[: MAX_CELL_LINES - 1], f"{lines[MAX_CELL_LINES - 1].rstrip(';,')} …"]
+        width = max(LINE_WIDTH - len(start) - 2, MIN_CELL)
+        lines = wrap(row[3], width, max_lines=MAX_CELL_LINES, placeholder=" …") or [NOTHING]
         yield f"  {start}{lines[0]}"
         yield from (f"  {' ' * len(start)}{line}" for line in lines[1:])
 
