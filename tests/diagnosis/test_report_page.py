@@ -295,7 +295,7 @@ def test_friction_beside_the_findings_of_a_joint_is_named_so_that_they_are_not_t
     named = [each for each in found.claims if each.effect != "viscous_friction"]
     table = joint_table(replace(found, claims=tuple(named), parts=()))
     place = table.headings.index("Other")
-    assert [row[place] for row in table.rows] == ["also, small or not sure, viscous friction"] * 3
+    assert [row[place] for row in table.rows] == ["also viscous friction (small or not sure)"] * 3
     assert "Other" not in joint_table(found).headings
 
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from armlab.common.told import MIN_NAME_PROBABILITY
 from armlab.diagnosis.changes.between_runs import scatter_between_runs
 from armlab.diagnosis.changes.change_search import find_rivals, held_out_errors
 from armlab.diagnosis.changes.changes import ChangeGroup, ChangeTable, Tested
@@ -22,6 +21,7 @@ from armlab.diagnosis.changes.pooled import Pooled, is_body
 from armlab.diagnosis.changes.soundness import held_out_gains
 from armlab.diagnosis.result import Member, Rival
 from armlab.diagnosis.torque.columns.columns import place_of
+from armlab.diagnosis.torque.names.findings import sure_together
 from armlab.effects.links import INERTIAL_ERROR_FACTS
 from armlab.effects.parameters import ParameterValue, parameter_values
 
@@ -60,9 +60,8 @@ class NamedChange:
 
     @property
     def told(self) -> tuple[Member, ...]:
-        """The likeliest of them that reach the probability of a name together."""
-        reached = np.cumsum([each.probability for each in self.members])
-        return self.members[: 1 + int(np.argmax(reached >= MIN_NAME_PROBABILITY))]
+        """The likeliest of them that are sure together."""
+        return sure_together(self.members)
 
     @property
     def not_told(self) -> tuple[Rival, ...]:

@@ -63,7 +63,7 @@ def _more_friction(diagnosis: Diagnosis, joint: int, own: Sequence[StatedFinding
     laws = [each for each in diagnosis.model.structure.components if each.is_friction_of(joint)]
     told = {each.claim.effect for each in own}
     names = dict.fromkeys(effect_in_words(each.effect) for each in laws if each.effect not in told)
-    return f"also, small or not sure, {join_words(list(names))}" if names else ""
+    return f"also {join_words(list(names))} (small or not sure)" if names else ""
 
 
 def _is_used(rows: Sequence[Sequence[str]], place: int) -> bool:

@@ -45,15 +45,21 @@ def state_name(effect: str, probability: float, members: Sequence[Member], place
         return Statement("name", (effect,), probability)
     here = [each for each in members if each.effect != UNKNOWN.id and each.joint in places]
     names = sorted(here, key=lambda each: -each.probability)
-    effects, total = list[str](), 0.0
-    for each in names[:MAX_CLASS_NAMES]:
-        effects.append(each.effect)
-        total += each.probability
-        if total >= MIN_NAME_PROBABILITY:
-            kind: Kind = "class" if effect in effects else "nothing"
-            return Statement(kind, tuple(effects), total)
+    if told := sure_together(names):
+        effects = tuple(each.effect for each in told)
+        return Statement("class" if effect in effects else "nothing", effects, sum(each.probability for each in told))
     chance = max(probability, _probability_of_friction(effect, names))
     return Statement("cause" if chance >= MIN_CAUSE_PROBABILITY else "nothing", (effect,), chance)
+
+
+def sure_together(names: Sequence[Member]) -> tuple[Member, ...]:
+    """The first of some names, the likeliest first, that reach the probability of a name together; else none."""
+    total = 0.0
+    for count, each in enumerate(names[:MAX_CLASS_NAMES], 1):
+        total += each.probability
+        if total >= MIN_NAME_PROBABILITY:
+            return tuple(names[:count])
+    return ()
 
 
 def _probability_of_friction(effect: str, names: Sequence[Member]) -> float:
