@@ -1,27 +1,39 @@
 """Bodies that are added to a link can exist."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import engine_cases as cases
 import numpy as np
 import pytest
 from effect_scenes import scene_of
 from small_recordings import ARM, PAYLOAD, frame, motion_at, recording_in
 
 from armlab.diagnosis.result import Claim
-from armlab.diagnosis.torque.diagnose import diagnose
-from armlab.diagnosis.torque.evidence.added_body import _fewer_off, _likeliest_body, is_possible_body
+from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.torque.columns.solver import State
+from armlab.diagnosis.torque.diagnose import diagnose, prepare
+from armlab.diagnosis.torque.evidence.added_body import (
+    _fewer_off,
+    _likeliest_body,
+    is_possible_body,
+    with_possible_bodies,
+)
 from armlab.diagnosis.torque.evidence.evidence import Evidence
 from armlab.diagnosis.torque.evidence.plausibility import _reason_other_mass, reason_link_unknown
+from armlab.diagnosis.torque.search.fitted_model import fit_background
 from armlab.diagnosis.torque.search.surrogate import Structure
 from armlab.diagnosis.tuning import Tuning
-from armlab.effects.links import BODY_SIZE_M, SolidBody
+from armlab.effects.library import library
+from armlab.effects.links import BODY_SIZE_M, Payload, PointPayload, SolidBody
 from armlab.effects.parameters import ParameterValue
 from armlab.recordings.load import load_recording
 from problem.arm import Link
 from problem.pseudo_inertia import link_from_centre_of_mass
 from problem.regressor import rigid_body_torque
+from problem.robot_file import load_arm
 
 BODY = np.asarray(link_from_centre_of_mass(120.0, np.array([0.0, 0.1, 0.2]), np.diag([2.0, 2.5, 3.0])).parameters)
 
@@ -142,6 +154,26 @@ def test_structure_beyond_a_link_may_be_of_a_body_that_a_later_link_carries() ->
     assert "a later link" in str(reason_beside(3, 0.1, ("position_3",), link=2))
     assert reason_beside(3, 0.1, ("velocity_3",), link=2) is None
     assert reason_beside(3, 0.1, ("position_3",), link=3) is None
+
+
+def test_a_prediction_has_no_body_of_negative_mass_whatever_its_form() -> None:
+    """A last link that is lighter than its simulation asks for such a body."""
+    arm = load_arm("irb120-arm")
+    lighter = np.concatenate([each.parameters for each in arm.links])
+    lighter[-10:] *= 0.7
+    recording = cases.recording(inertial=lighter)
+    model = fit_background(prepare(recording, None, Settings(), lambda message: None), library(), 0, lambda _: None)
+    forms = set()
+    for number, group in enumerate(model.solver.groups):
+        if group.candidate.effect == "payload" and group.candidate.joint == len(arm):
+            loaded: Any = SimpleNamespace(model=replace(model, state=State((number,), (0.0,) * len(arm))))
+            before = group.candidate.added_body(model.solver.values(loaded.model.fit, number))
+            with_possible_bodies(loaded)
+            after = group.candidate.added_body(model.solver.values(loaded.model.fit, number))
+            assert before is not None
+            assert before[0] < 0 <= after[0]
+            forms.add(type(group.candidate))
+    assert forms == {Payload, PointPayload}
 
 
 @pytest.mark.parametrize(("anew", "told"), [(2.05, True), (2.5, False), (None, True)])

@@ -395,16 +395,26 @@ def impossible_bodies(model: FittedModel) -> tuple[int, ...]:
 
 
 def with_possible_bodies(prediction: Prediction) -> Prediction:
-    """The same with added bodies that can exist: where the free fit gives another, the likeliest one that can."""
+    """The same with added bodies that can exist: where the free fit gives another, the likeliest one that can.
+
+    Of a body of known form that is none: its mass would be negative.
+    """
     model = prediction.model
     if not model.design.settings.guards.physics_signs:
         return prediction
     for group in payload_groups(model):
         ten = model.candidate(group).added_body(model.solver.values(model.fit, group))
         if ten is None or not is_possible_body(ten):
-            body = fit_body(model, model.state.minus(group), group, _link(model, group))
-            model.solver.hold(model.state, body.coefficients)
+            model.solver.hold(model.state, _coefficients_of_possible_body(model, group))
     return prediction
+
+
+def _coefficients_of_possible_body(model: FittedModel, group: int) -> Array:
+    """Coefficients (size,) of a model in which this body can exist."""
+    without = model.state.minus(group)
+    if isinstance(model.candidate(group), Payload):
+        return fit_body(model, without, group, _link(model, group)).coefficients
+    return model.solver.free_fit(without).coefficients
 
 
 def _names(model: FittedModel, groups: Sequence[int]) -> str:
