@@ -172,7 +172,7 @@ def order_resolution(scenes: Sequence[Scene], joint: int) -> tuple[float, float]
     travel = max(float(np.ptp(scene.motion.position[:, joint - 1])) for scene in scenes)
     # half of the time of the slowest run the joint is slower than this: there a wave has eight samples
     pace = min(float(np.median(np.abs(scene.motion.velocity[:, joint - 1])) * scene.step) for scene in scenes)
-    return np.pi / travel, min(MAX_ORDER, 2 * np.pi / (8 * pace))
+    return np.pi / travel, MAX_ORDER if pace <= 0 else min(MAX_ORDER, 2 * np.pi / (8 * pace))
 
 
 def _ripple_of_order(arm: Arm, joint: int, order: float, step: float) -> TorqueRipple:

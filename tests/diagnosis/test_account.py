@@ -24,11 +24,17 @@ from armlab.diagnosis.torque.names.findings import (
     with_minor_ones,
     without_lesser_unknowns,
 )
-from armlab.diagnosis.torque.predict.parts import add_in_order, cause_of, stack_in_units, weigh_claims
+from armlab.diagnosis.torque.predict.parts import (
+    _rows_and_units,
+    add_in_order,
+    cause_of,
+    stack_in_units,
+    weigh_claims,
+)
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_background
 from armlab.effects.contract import UNKNOWN, Effect
 from armlab.effects.library import effect_named, library
-from armlab.report.account.summary import list_while_short
+from armlab.report.account.summary import format_speed, list_while_short
 
 MISSED = Removal(0, growth=0.5, rms=1.0, torque=10.0, joints=(0, 1))
 HARDLY = Removal(0, growth=0.04, rms=1.0, torque=1.0)
@@ -182,6 +188,17 @@ def test_each_joint_counts_in_units_of_its_own_torque() -> None:
     rows = [np.array([True, True])] * 2
     stacked = stack_in_units(torque, rows, np.array([100.0, 1.0]))
     assert stacked @ stacked == pytest.approx(2.0)
+
+
+def test_a_joint_without_torque_counts_in_units_of_the_largest() -> None:
+    torque = np.array([[3.0, 0.0], [-3.0, 1e-12]])
+    observed: Any = SimpleNamespace(joints=2, torque=torque, rows_held_out=lambda joint: np.array([True, True]))
+    assert _rows_and_units(observed)[1].tolist() == [3.0, 3.0]
+
+
+def test_slow_speeds_are_told_in_thousandths() -> None:
+    assert format_speed(0.15, "N m") == "0.15 rad/s"
+    assert format_speed(7e-5, "N") == "0.07 mm/s"
 
 
 @pytest.mark.parametrize(

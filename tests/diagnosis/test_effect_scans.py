@@ -1,6 +1,7 @@
 """Cheap looks at a residual: they find the order of a ripple and the time of a push, and count what they compared."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from effect_scenes import family, scene
 
 from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Scene
+from armlab.effects.springs import MAX_ORDER, order_resolution
 
 
 def scanned(effect: str, residual: Callable[[Scene], Array], joint: int) -> list[Candidate]:
@@ -30,6 +32,14 @@ def test_scan_finds_the_order_of_a_ripple(order: float) -> None:
     assert low < order < high
     assert high - low < 6
     assert found[0].looks > 50
+
+
+def test_a_joint_that_rests_for_most_of_a_run_is_slow_enough_for_all_orders() -> None:
+    moving = scene(seed=1)
+    velocity = moving.motion.velocity.copy()
+    velocity[: int(0.6 * len(velocity)), 1] = 0.0
+    resting = replace(moving, motion=replace(moving.motion, velocity=velocity))
+    assert order_resolution([resting], 2)[1] == MAX_ORDER
 
 
 def test_scan_finds_the_stretch_of_a_push() -> None:

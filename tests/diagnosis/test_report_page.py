@@ -473,8 +473,8 @@ def test_an_unknown_is_shown_with_its_surrogate_over_what_it_depends_on_and_mark
 
 def test_a_wrong_reading_is_the_headline_and_nothing_is_told_twice(found: Diagnosis) -> None:
     wrong = "The recording is read wrongly: joint 1 counts the other way round."
-    answer: Any = SimpleNamespace(sentence=wrong, mistakes=("joint_direction",))
+    answer: Any = SimpleNamespace(sentences=(wrong,), mistakes=("joint_direction",))
     shown = first_screen(replace(found, setup=answer))
-    assert shown.headline == answer.sentence
+    assert shown.headline == wrong
     assert shown.paragraphs[0].startswith("Of the recording read rightly: ")
     assert " ".join((shown.headline, *shown.paragraphs)).count("% of the error comes from") == 1

@@ -1,5 +1,6 @@
 """Mistakes are put into the files as people make them, whatever the channels of a recording are."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from small_recordings import ARM, POSITION, frame, recording_in
 from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.proof.blind.setup.mistakes import Injected, inject
 from armlab.recordings.load import load_recording
+from armlab.report.account.summary import summary_of
 from armlab.report.torque.torque_verdict import verdict_sentences
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
@@ -56,6 +58,16 @@ def test_a_reading_is_asked_beside_a_joint_without_torque(tmp_path: Path) -> Non
     found = diagnose(load_recording(recording_in(tmp_path / "rig", run, validate=False)), only_setup=True)
     assert (found.status, found.setup.sentence) == ("mismatch", "Left out: joint 2 has no torque.")
     assert found.reason == "Nothing else is wrong with the reading; physics was not asked."
+
+
+def test_a_summary_has_three_sentences_beside_a_mistake_of_the_reading(tmp_path: Path) -> None:
+    run = frame(0, 8).assign(tau2=0.0)
+    run["tau1"] += 3.0 * np.sign(np.gradient(run["q1"]))
+    found = diagnose(load_recording(recording_in(tmp_path / "rig", run, validate=False)))
+    sentences = re.split(r"(?<=[.])\s+(?=[A-Z0-9])", summary_of(found))
+    assert len(sentences) <= 3
+    assert sentences[0] == "Left out: joint 2 has no torque."
+    assert "friction" in sentences[1]
 
 
 def test_a_reading_that_is_right_is_called_right(tmp_path: Path) -> None:

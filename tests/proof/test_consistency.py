@@ -44,6 +44,8 @@ def verdict(*findings: FindingEntry, summary: str = SUMMARY, shares: tuple[float
 
 def test_a_sound_verdict_contradicts_nothing() -> None:
     assert contradictions(verdict(finding("viscous_friction"))) == ()
+    factor = f"Torque gain error at joint 2: factor 1.48 (1.44 to 1.52). {SUMMARY}"
+    assert contradictions(verdict(finding("viscous_friction"), summary=factor)) == ()
 
 
 @pytest.mark.parametrize(

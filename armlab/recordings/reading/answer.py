@@ -123,22 +123,26 @@ class Answer:
     @property
     def sentence(self) -> str:
         """The findings in words; empty where there is none."""
-        left_out = [each.description for each in self.findings if each.mistake.effect == NO_TORQUE]
-        absent = f"Left out: {'; '.join(left_out)}." if left_out else ""
-        return " ".join(each for each in (absent, self._wrong_in_words()) if each)
+        return " ".join(self.sentences)
 
-    def _wrong_in_words(self) -> str:
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What is wrong, why it is believed, what was left out and what stays open; the most important first."""
+        absent = "; ".join(each.description for each in self.findings if each.mistake.effect == NO_TORQUE)
+        left_out = (f"Left out: {absent}.",) if absent else ()
         if not self.mistakes:
-            return ""
-        mistakes = "; ".join(each.description for each in self.mistakes)
+            return left_out
+        wrong = f"The recording is read wrongly: {'; '.join(each.description for each in self.mistakes)}."
         if self.is_lost:
-            return f"The recording is read wrongly: {mistakes}. Links and friction cannot be told from it."
-        zeros = joints_in_words(self.recording.arm, self.undecided) if self.undecided else ""
-        open_zeros = f" These data do not tell the zero of {zeros} by quarters of a turn." if zeros else ""
-        return (
-            f"The recording is read wrongly: {mistakes}. Read rightly, links and usual friction fit with an error of "
-            f"{100 * self.share_after:.1f} % of the torque, not {100 * self.share:.1f} %.{open_zeros}"
+            return wrong, "Links and friction cannot be told from it.", *left_out
+        error, before = 100 * self.share_after, 100 * self.share
+        rightly = (
+            f"Read rightly, links and usual friction fit with an error of {error:.1f} % of the torque, "
+            f"not {before:.1f} %."
         )
+        zeros = joints_in_words(self.recording.arm, self.undecided) if self.undecided else ""
+        open_zeros = (f"These data do not tell the zero of {zeros} by quarters of a turn.",) if zeros else ()
+        return wrong, rightly, *left_out, *open_zeros
 
 
 def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTuning) -> Answer:

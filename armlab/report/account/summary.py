@@ -28,26 +28,38 @@ from armlab.report.words import (
 )
 from problem.joint_words import joint_in_words, joints_in_words, links_in_words
 
-MAX_WORDS = 70  # of a summary
+MAX_SENTENCES, MAX_WORDS = 3, 70  # of a summary
 MAX_FIRST_WORDS = 30  # of its first sentence
 MAX_FIGURES = 3  # in its second sentence
 
 
 def summary_of(diagnosis: Diagnosis) -> str:
     """How the recording is to be read where that is wrong, then the physics."""
-    setup = diagnosis.setup.sentence if diagnosis.setup else ""
-    return " ".join(each for each in (setup, physics_in_words(diagnosis)) if each)
+    return " ".join(each for each in (reading_in_words(diagnosis), physics_in_words(diagnosis)) if each)
+
+
+def reading_in_words(diagnosis: Diagnosis) -> str:
+    """How the recording is to be read where that is wrong."""
+    return " ".join(_reading_sentences(diagnosis))
+
+
+def _reading_sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """So few that the physics has a sentence at least, and room for it."""
+    every = diagnosis.setup.sentences[: MAX_SENTENCES - 1] if diagnosis.setup else ()
+    is_long = len(" ".join(every).split()) > MAX_WORDS - MAX_FIRST_WORDS
+    return every[:1] if is_long and diagnosis.fit else every
 
 
 def physics_in_words(diagnosis: Diagnosis) -> str:
-    """At most three sentences and MAX_WORDS words; of a recording without a model, why there is none."""
-    if diagnosis.unnamed is not None and diagnosis.model is not None:
-        return _describe_unnamed(diagnosis.unnamed, diagnosis.model)
+    """As many sentences and words as the reading leaves; of a recording without a model, why there is none."""
     return " ".join(sentences_of(diagnosis)) if diagnosis.fit else diagnosis.reason
 
 
 def sentences_of(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """The sentences of the summary, the most important first."""
+    """The sentences of the physics, as many as the reading leaves, the first one the most important."""
+    most = MAX_SENTENCES - len(_reading_sentences(diagnosis))
+    if diagnosis.unnamed is not None and diagnosis.model is not None:
+        return _describe_unnamed(diagnosis.unnamed, diagnosis.model)[:most]
     account = account_of(diagnosis)
     if not diagnosis.claims:
         worst = max((each.after for each in diagnosis.fit), default=0.0)
@@ -56,8 +68,8 @@ def sentences_of(diagnosis: Diagnosis) -> tuple[str, ...]:
     if not account.findings:
         small, change = count_of(len(account.minor), "small difference"), "change" if account.minor[1:] else "changes"
         first = f"Nothing of practical size is missing: {small} {change} no held-out error by 5 %."
-        return first, _rest(account, diagnosis)
-    return _Writer(diagnosis, account).sentences()
+        return (first, _rest(account, diagnosis))[:most]
+    return _Writer(diagnosis, account).sentences(most)
 
 
 def _rest(account: Account, diagnosis: Diagnosis) -> str:
@@ -75,8 +87,11 @@ class _Writer:
     diagnosis: Diagnosis
     account: Account
 
-    def sentences(self) -> tuple[str, ...]:
+    def sentences(self, most: int) -> tuple[str, ...]:
+        """Where the error comes from, then what is left, then the sizes in between, as far as there is room."""
         first, last = self._where(), self._gain()
+        if most < MAX_SENTENCES:
+            return (first, last)[:most]
         left = MAX_WORDS - len(first.split()) - len(last.split())
         shown = list[str]()
         for each in self._figures():
@@ -213,7 +228,7 @@ def friction_sizes(diagnosis: Diagnosis, account: Account, cause: StatedCause) -
     if low is high:
         unit = joint_unit(arm, high.joint - 1)
         pairs = zip(high.torque, high.speeds, strict=True)
-        sizes = [f"{format_number(torque)} {unit} at {format_number(at, 2)} {speed_unit(unit)}" for torque, at in pairs]
+        sizes = [f"{format_number(torque)} {unit} at {format_speed(at, unit)}" for torque, at in pairs]
         return (join_words(sizes),)
     return tuple(
         f"{format_number(each.torque[1])} {joint_unit(arm, each.joint - 1)} ({joint_in_words(arm, each.joint)})"
@@ -238,9 +253,10 @@ def errors_at_start(diagnosis: Diagnosis) -> Sequence[float]:
     return out
 
 
-def speed_unit(torque_unit: str) -> str:
-    """`rad/s` of a joint with torque, `m/s` of one with a force."""
-    return "rad/s" if torque_unit == "N m" else "m/s"
+def format_speed(speed: float, torque_unit: str) -> str:
+    """`0.15 rad/s` of a joint with torque, `0.07 mm/s` of one with a force."""
+    unit = "rad/s" if torque_unit == "N m" else "m/s"
+    return f"{format_number(1000 * speed, 2)} m{unit}" if 0 < speed < 0.001 else f"{format_number(speed, 2)} {unit}"
 
 
 def _name_of_friction(own: Sequence[StatedFinding]) -> str:
@@ -274,13 +290,14 @@ def _name_of(own: Sequence[StatedFinding]) -> str:
     return f"{name}{behind}{' (not certain)' if first.kind == 'cause' else ''}"
 
 
-def _describe_unnamed(joint: JointFit, model: TorqueModel) -> str:
+def _describe_unnamed(joint: JointFit, model: TorqueModel) -> tuple[str, str]:
     """What is known where a model predicts better and none of its parts is sure enough for a name."""
     parts = [model.structure.components[index] for index in sorted(model.unclaimed)]
     names = dict.fromkeys(effect_in_words(each.effect) for each in parts if each.joint == joint.joint)
     here, where = join_words(list(names)) if names else "the links as fitted", joint_in_words(model.arm, joint.joint)
+    fall = f"from {format_fixed(joint.before)} to {format_fixed(joint.after)} {joint_unit(model.arm, joint.joint - 1)}"
     return (
         f"Something is missing at {where}, and these data cannot name it surely: with what the model holds "
-        f"without a claim ({here}) the error on held-out data falls from {joint.before:.3g} to {joint.after:.3g}. "
-        "Record longer motion with more reversals and speeds."
+        f"without a claim ({here}) the error on held-out data falls {fall}.",
+        "Record longer motion with more reversals and speeds.",
     )

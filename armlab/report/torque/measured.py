@@ -14,7 +14,7 @@ from armlab.effects.friction import COULOMB_FACTS, VISCOUS_FACTS
 from armlab.effects.library import effect_named
 from armlab.effects.links import PAYLOAD_FACTS
 from armlab.report.account.account import Account, StatedFinding, account_of
-from armlab.report.account.summary import speed_unit
+from armlab.report.account.summary import format_speed
 from armlab.report.torque.sentences import claim_figures, finding_sentence, number_in_words
 from armlab.report.words import (
     effect_in_words,
@@ -77,7 +77,7 @@ def friction_cell(account: Account, joint: int, arm: Arm) -> str:
         return NOTHING
     unit = joint_unit(arm, joint - 1)
     low, high = (_together(f"{format_fixed(size)} {unit}") for size in row.torque)
-    first, last = (_together(f"{format_number(speed, 2)} {speed_unit(unit)}") for speed in row.speeds)
+    first, last = (_together(f"{format_speed(speed, unit)}") for speed in row.speeds)
     return f"{low} at {first}, {high} at {last}"
 
 

@@ -12,7 +12,7 @@ from armlab.effects.links import PAYLOAD_FACTS
 from armlab.recordings.reading.answer import SetupFinding
 from armlab.report.account.account import Account, StatedFinding, account_of, finding_errors
 from armlab.report.account.next_steps import next_steps
-from armlab.report.account.summary import physics_in_words, sentences_of, shorter_list
+from armlab.report.account.summary import physics_in_words, reading_in_words, sentences_of, shorter_list
 from armlab.report.torque.measured import NOTHING, doubt_in_words, friction_cell
 from armlab.report.torque.residuals import select_residuals
 from armlab.report.torque.sentences import claim_figures, model_in_words, simulated_figures
@@ -40,9 +40,9 @@ from problem.joint_words import joint_in_table, joint_in_words
 
 def verdict_sentences(diagnosis: Diagnosis) -> tuple[str, str]:
     """The first sentence of the verdict, and the others: of a recording that is read wrongly, that first."""
-    setup = diagnosis.setup.sentence if diagnosis.setup else ""
-    if setup:
-        return setup, physics_in_words(diagnosis)
+    reading = reading_in_words(diagnosis)
+    if reading:
+        return reading, physics_in_words(diagnosis)
     if diagnosis.status == "inconclusive":
         return "These recordings allow no verdict.", physics_in_words(diagnosis)
     if not diagnosis.fit:  # physics was not asked

@@ -229,9 +229,12 @@ def _without(state: State, groups: Sequence[int]) -> State:
     return State(tuple(each for each in state.groups if each not in groups), state.widths)
 
 
+NO_TORQUE = 1e-9  # of the largest torque: what rounding leaves of a drive that is off
+
+
 def stack_in_units(torque: Array, rows: Sequence[NDArray[np.bool_]], units: Array) -> Array:
     """Some rows of each joint (rows, joints) one after the other, the mean square of each joint in its own unit."""
-    scales = [max(float(unit), 1e-300) * np.sqrt(max(int(own.sum()), 1)) for unit, own in zip(units, rows, strict=True)]
+    scales = [float(unit) * np.sqrt(max(int(own.sum()), 1)) for unit, own in zip(units, rows, strict=True)]
     return np.concatenate([torque[own, joint] / scales[joint] for joint, own in enumerate(rows)])
 
 
@@ -246,7 +249,7 @@ def explain_error(
     rows, units = _rows_and_units(observed)
     whole, left = (stack_in_units(each, rows, units) for each in errors)
     power = max(float(whole @ whole), 1e-300)
-    floor = min(float(np.sum((noise / np.maximum(units, 1e-300)) ** 2)), float(left @ left))
+    floor = min(float(np.sum((noise / units) ** 2)), float(left @ left))
     parts = list(weigh_parts(model, claims))
     for number, claim in enumerate(claims):
         if claim.effect == UNKNOWN.id and np.any(claim.left_out):
@@ -271,10 +274,11 @@ def as_found(removal: Removal | None, errors: Mapping[int, float], observed: Obs
 
 
 def _rows_and_units(observed: Observed) -> tuple[list[NDArray[np.bool_]], Array]:
-    """The held-out rows of each joint, and the rms of its torque there, N m (N)."""
+    """The held-out rows of each joint, and the rms of its torque there, N m (N); the largest one where it has none."""
     rows = [observed.rows_held_out(joint) for joint in range(observed.joints)]
     torque = observed.torque
-    return rows, np.array([np.sqrt(np.mean(torque[own, joint] ** 2)) for joint, own in enumerate(rows)])
+    sizes = np.array([np.sqrt(np.mean(torque[own, joint] ** 2)) for joint, own in enumerate(rows)])
+    return rows, np.where(sizes > NO_TORQUE * sizes.max(), sizes, sizes.max() or 1.0)
 
 
 def _with_share(part: Part, share: float) -> Part:

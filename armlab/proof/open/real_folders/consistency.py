@@ -12,7 +12,7 @@ MAX_SENTENCES, MAX_WORDS, MAX_CAUSES, MAX_OF_JOINT = 3, 70, 4, 2
 ROUNDING = 1e-6  # of shares and errors that are added up again
 FIRST_SHARE = re.compile(r"^(\d+) % of the error comes from ")
 UNIT = r"(?:N m|N|kg|%|mrad|rad|mm|m|s|ms|Hz|V|A|deg)"
-NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?![\w.]*\d)")
+NUMBER = re.compile(r"(?<![\w.])(?<!factor )[−-]?\d+(?:\.\d+)?(?![\w.]*\d)")
 PLACE = re.compile(r"(?:joints?|links?|all) (?:\d+(?:, | and )?)+")  # numbers of joints have no unit
 
 
@@ -64,7 +64,7 @@ def _numbers(verdict: VerdictFile) -> Iterator[str]:
     text = PLACE.sub("", re.sub(r"\([^()]*\)", "", verdict.summary))
     for found in NUMBER.finditer(text):
         rest = text[found.end() :]
-        if not re.match(rf"\s*(?:{UNIT}\b|%|from|to [\d.]+|small difference|$)", rest):
+        if not re.match(rf"\s*(?:{UNIT}\b|%|times\b|from|to [\d.]+|small difference|$)", rest):
             yield f"the summary has {found[0]} without a unit"
 
 
