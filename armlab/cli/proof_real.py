@@ -168,7 +168,7 @@ def real_conditioning(results: Path, recordings: Path, only: tuple[str, ...]) ->
 @click.option("--results", type=OutputPath(), default=Path("results/relations"), show_default=True)
 @click.option("--recordings", type=OutputPath(), default=Path(".armlab/recordings"), show_default=True)
 @click.option("--only", multiple=True, help="Name of a recording [default: all at hand].")
-@click.option("--part", type=click.Choice(["all", "quick", "null-pairs"]), default="all", show_default=True)
+@click.option("--part", type=click.Choice(["all", "quick", "null-pairs", "parts"]), default="all", show_default=True)
 @prints_lines
 def relations(
     folders: tuple[Path, ...], results: Path, recordings: Path, only: tuple[str, ...], part: str
@@ -176,13 +176,14 @@ def relations(
     """Check relations that need no truth on real recordings.
 
     A recording against itself has no change, the found model explains its recording, other units change nothing, and
-    others. Writes relations.md; an interrupted command continues. Parts: the short relations, or those of stretches
-    that are independent of each other, between which nothing has changed (null-pairs.md).
+    others. Writes relations.md; an interrupted command continues. Parts: the short relations; those of stretches that
+    are independent of each other, between which nothing has changed (null-pairs.md); or whether verdicts on cut and
+    spoilt copies contradict themselves (parts.md).
     """
     from armlab.proof.open.relations.all_relations import check_relations
-    from armlab.proof.open.relations.relations import NULL_PAIRS, QUICK, RELATIONS
+    from armlab.proof.open.relations.relations import NULL_PAIRS, PARTS, QUICK, RELATIONS
 
-    names = {"all": tuple(RELATIONS), "quick": QUICK, "null-pairs": NULL_PAIRS}[part]
+    names = {"all": tuple(RELATIONS), "quick": QUICK, "null-pairs": NULL_PAIRS, "parts": (PARTS,)}[part]
     return check_relations(results, recordings, folders, only, names, tell_progress)
 
 

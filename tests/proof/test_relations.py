@@ -7,7 +7,15 @@ import pytest
 from small_recordings import frame, recording_in
 
 from armlab.proof.open.relations.all_relations import check_relations, relations_page
-from armlab.proof.open.relations.relations import NULL_PAIRS, QUICK, RELATIONS, Desk, RelationOutcome, check_relation
+from armlab.proof.open.relations.relations import (
+    NULL_PAIRS,
+    PARTS,
+    QUICK,
+    RELATIONS,
+    Desk,
+    RelationOutcome,
+    check_relation,
+)
 from armlab.proof.open.relations.variants import (
     every_other_second,
     half,
@@ -42,6 +50,18 @@ def desk() -> Desk:
 def test_relation_holds_on_a_small_recording(name: str, recording: Recording, desk: Desk) -> None:
     outcome = check_relation(name, recording, desk)
     assert outcome.holds, outcome.detail
+
+
+def test_verdicts_on_spoilt_copies_and_on_a_part_contradict_nothing(
+    recording: Recording, desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("armlab.proof.open.relations.relations.parts_of", lambda each: [("half", half(each, 0))])
+    outcome = check_relation(PARTS, recording, desk)
+    assert outcome.holds, outcome.detail
+    assert outcome.detail == "4 verdicts"
+    monkeypatch.setattr("armlab.proof.open.relations.relations.contradictions", lambda verdict: ("a sentence twice",))
+    monkeypatch.setattr("armlab.proof.open.relations.relations.spoilt", lambda each: [])
+    assert check_relation(PARTS, recording, desk).detail == "half: a sentence twice"
 
 
 def test_variants_hold_the_same_motion(recording: Recording) -> None:

@@ -13,14 +13,15 @@ from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.report.wording import join_words
 from armlab.common.statistics import wilson_interval
-from armlab.proof.open.relations.relations import NULL_PAIRS, RELATIONS, Desk, RelationOutcome, check_relation
+from armlab.proof.open.relations.relations import NULL_PAIRS, PARTS, RELATIONS, Desk, RelationOutcome, check_relation
 from armlab.proof.open.stored import code_digest, recording_digest
 from armlab.recordings.load import load_recording
 from armlab.recordings.public import PUBLIC_RECORDINGS, is_available, open_public_recording
 from armlab.recordings.recording import Recording
 
 STORE = "relations.jsonl"
-PAGE, NULL_PAIRS_PAGE = "relations.md", "null-pairs.md"
+PAGE = "relations.md"
+PAGES = {frozenset(NULL_PAIRS): "null-pairs.md", frozenset({PARTS}): "parts.md"}  # of some relations alone
 ANSWERS = {True: "held", False: "**broken**", None: "no answer"}
 
 
@@ -49,8 +50,9 @@ def check_relations(
                 _append(results / STORE, key, stored[key])
             outcomes.append(stored[key])
             yield f"{recording.name}: {name}: {ANSWERS[stored[key].holds].strip('*')} ({stored[key].detail})"
-    page = NULL_PAIRS_PAGE if set(names) == set(NULL_PAIRS) else PAGE
-    yield count_null_pairs(outcomes)
+    page = PAGES.get(frozenset(names), PAGE)
+    if set(names) & set(NULL_PAIRS):
+        yield count_null_pairs(outcomes)
     yield from (f"wrote {path}" for path in write_texts({page: relations_page(outcomes)}, results))
 
 
@@ -95,7 +97,8 @@ def relations_page(outcomes: Sequence[RelationOutcome]) -> str:
         "Relations that hold whatever is true of the robot, so that no answer is needed to check them "
         "(`armlab proof relations`). A broken one is a fault of the diagnosis or of the comparison."
     )
-    parts = [markdown_table(("relation", *recordings), rows), count_null_pairs(outcomes), "## Details"]
+    counted = (count_null_pairs(outcomes),) if set(relations) & set(NULL_PAIRS) else ()
+    parts = [markdown_table(("relation", *recordings), rows), *counted, "## Details"]
     details = [(each.recording, each.relation, ANSWERS[each.holds], each.detail) for each in outcomes]
     return markdown_page("Relations", intro, *parts, markdown_table(("recording", "relation", "", "why"), details))
 

@@ -16,14 +16,17 @@ from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.diagnosis.torque.predict.found_model import model_found
 from armlab.identification.model_file import model_text
+from armlab.proof.open.real_folders.consistency import contradictions
 from armlab.proof.open.relations.variants import (
     every_other_second,
     fewer_rows,
     half,
     loaded_joint,
     one_run,
+    parts_of,
     resampled,
     rewritten,
+    spoilt,
     thinned,
     with_noise,
     with_viscous_friction,
@@ -31,6 +34,7 @@ from armlab.proof.open.relations.variants import (
 from armlab.proof.open.stored import recording_digest
 from armlab.recordings.plain_least_squares import SEEN_ERRORS, compare_plain
 from armlab.recordings.recording import Recording
+from armlab.report.verdict_files import make_verdict
 
 STRETCH_S = (1.0, 2.0, 3.0)  # odd against even: the shortest stretches that can be filtered
 MIRROR_TOLERANCE = 0.05  # of a change, between one direction and the other
@@ -268,6 +272,22 @@ def predicts_as_well_as_identification(recording: Recording, desk: Desk) -> tupl
     return ours <= (1 + ROUNDING) * plain, f"{ours:.4g} against {plain:.4g} N m (N)"
 
 
+def parts_agree_with_themselves(recording: Recording, desk: Desk) -> tuple[bool | None, str]:
+    """Parts of a recording, and copies with wrong torque, are refused or get a verdict that contradicts nothing."""
+    answers, wrong = 0, list[str]()
+    for name, each in (*parts_of(recording), *spoilt(recording)):
+        try:
+            verdict = make_verdict(diagnose(each))
+        except DataError:
+            continue
+        answers += 1
+        wrong += [f"{name}: {what}" for what in contradictions(verdict)]
+    if not answers:
+        return None, "all parts are refused"
+    return not wrong, "; ".join(wrong) or f"{answers} verdicts"
+
+
+PARTS = "parts agree with themselves"
 RELATIONS: dict[str, Relation] = {
     "X against X": against_itself,
     "X against X, rows thinned": against_thinned,
@@ -284,6 +304,7 @@ RELATIONS: dict[str, Relation] = {
     "what is seen plainly is named": what_is_seen_plainly_is_named,
     "no finding raises the held-out error": findings_help,
     "predicts as well as identification": predicts_as_well_as_identification,
+    PARTS: parts_agree_with_themselves,
 }
 NULL_PAIRS = ("odd against even seconds", "first against second half", "run against run")  # independent stretches
 QUICK = (

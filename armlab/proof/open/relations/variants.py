@@ -17,6 +17,7 @@ CLOCK_SHIFT_S = 1234.5
 WHOLE = "whole"
 FIRST_S, LAST_S, STRETCH_S, ROW_STEPS = (4.0, 6.0, 12.0), 6.0, 3.0, (2, 3, 5)  # what is cut from a recording
 ADDED_SHARE = 0.3  # of the root mean square of the torque
+SPOILT_SCALES, SPOILT_NOISE = (0.3, 1.6), 0.3  # of the torque of a joint; of the deviation of each joint's torque
 
 
 def with_runs(recording: Recording, runs: list[Run]) -> Recording:
@@ -97,6 +98,20 @@ def parts_of(recording: Recording) -> Iterator[tuple[str, Recording]]:
     cut |= {f"every row in {step}": every_row(recording, step) for step in ROW_STEPS}
     rows = sum(run.samples for run in recording.runs)
     yield from ((name, each) for name, each in cut.items() if 0 < sum(run.samples for run in each.runs) < rows)
+
+
+def spoilt(recording: Recording) -> Iterator[tuple[str, Recording]]:
+    """Copies whose torque is wrong, with a name for each: of one joint too small or too large, of all joints noisy."""
+    joint, rng = loaded_joint(recording), np.random.default_rng(0)
+    for scale in SPOILT_SCALES:
+        factors = np.where(np.arange(len(recording.arm)) == joint, scale, 1.0)
+        runs = [run.with_signals(run.time, {"torque": factors * run.torque}) for run in recording.runs]
+        yield f"torque of joint {joint + 1} times {scale:g}", with_runs(recording, runs)
+    noisy = []
+    for run in recording.runs:
+        noise = SPOILT_NOISE * np.std(run.torque, axis=0) * rng.standard_normal(run.torque.shape)
+        noisy.append(run.with_signals(run.time, {"torque": run.torque + noise}))
+    yield f"noise of {SPOILT_NOISE:g} of each torque", with_runs(recording, noisy)
 
 
 def one_run(recording: Recording, run: Run) -> Recording:
