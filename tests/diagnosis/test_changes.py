@@ -40,7 +40,13 @@ from armlab.recordings.load import load_recording
 from armlab.recordings.plain_least_squares import compare_plain
 from armlab.recordings.public import fetch_recording
 from armlab.recordings.recording import Recording
-from armlab.report.changes.comparison_report import comparison_lines, comparison_sentences, make_comparison_file
+from armlab.report.changes.comparison_report import (
+    _amount,
+    comparison_lines,
+    comparison_sentences,
+    deciding_steps,
+    make_comparison_file,
+)
 from problem.regressor import rigid_body_torque
 
 pytestmark = pytest.mark.usefixtures("each_diagnosed_once")
@@ -158,6 +164,11 @@ def test_a_change_whose_name_is_not_sure_is_told_by_its_class() -> None:
     assert "this changed: payload at link 3 or encoder offset at joint 2 (mass" in first
     text = " ".join(" ".join(comparison_lines(replace(comparison("loaded"), findings=(unsure,)))).split())
     assert "could also be Coulomb friction at joint 1 and inertial parameter error at link 3" in text
+    decides = (
+        "next: To tell payload at link 3 from encoder offset at joint 2 or Coulomb friction at joint 1: repeat the"
+    )
+    assert decides in text
+    assert not list(deciding_steps(comparison("loaded")))  # an error of the link is the same whatever moves
     one_place = replace(load, effect="torque_offset", joint=2, probability=1 / (1 + np.exp(-1)), rivals=(near,))
     first, _ = comparison_sentences(replace(comparison("loaded"), findings=(one_place,)))
     assert "torque offset or encoder offset at joint 2 (" in first
@@ -384,3 +395,17 @@ def test_friction_that_grows_steadily_has_a_slope_per_day() -> None:
 def test_dates_have_to_be_as_many_as_recordings() -> None:
     message = refusal(compare, recording("cold", 0), recording("again", 10), dates=[date(2026, 1, 1)])
     assert "1 dates for 2 recordings" in message
+
+
+def _change(first: float, last: float, ratio: tuple[float, float, float] | None) -> Change:
+    """Of a first moment. ratio: with its interval."""
+    interval = (last - first - 0.01, last - first + 0.01)
+    return Change("payload", 1, (1,), "mcx", (first, last), last - first, interval, ratio, "kg.m", 1e-6, 0.01, True)
+
+
+def test_a_change_is_told_in_percent_only_where_that_is_well_known() -> None:
+    assert _amount(_change(0.1, 0.16, (1.6, 1.3, 2.0))) == "first moment x from 0.1 to 0.16 kg m, +60 % (+30 to +100 %)"
+    wide = _change(0.1, 0.16, (1.6, 0.1, 30.0))
+    assert _amount(wide, short=True) == "first moment x from 0.1 to 0.16 kg m"
+    assert _amount(wide) == "first moment x from 0.1 to 0.16 kg m, a difference of 0.06 (0.05 to 0.07) kg m"
+    assert _amount(_change(0.1, -2e-5, None), short=True) == "first moment x from 0.1 to 0 kg m"

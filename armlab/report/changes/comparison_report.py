@@ -52,6 +52,7 @@ from armlab.recordings.load import load_recording
 from armlab.report.account.summary import MAX_WORDS
 from armlab.report.changes.trend_report import content_over_recordings, trend_part, trend_phrase
 from armlab.report.torque.content import origin_of
+from armlab.report.torque.sentences import number_in_words
 from armlab.report.torque.torque_verdict import LINE_WIDTH
 from armlab.report.verdict_files import check_output_folder
 from armlab.report.words import (
@@ -66,6 +67,8 @@ from armlab.report.words import (
 from problem.arm import Arm
 
 MAX_NAMED_CHANGES = 3
+NO_LEVEL = 5e-3  # of the first level: what is smaller has gone
+MAX_RATIO_SPAN = 10.0  # highest over lowest end of an interval that is told in percent
 NOTHING_ELSE = "No other change is sure."
 SEEN_EFFECTS = ("coulomb_friction", "viscous_friction", "payload", "torque_gain_error", "encoder_offset", "time_delay")
 
@@ -75,7 +78,7 @@ def comparison_sentences(comparison: Comparison) -> tuple[str, str]:
     names = join_words(comparison.names)
     seen = detectable_sentence(comparison)
     if comparison.doubtful is not None:
-        phrase = change_phrase(comparison.arm, comparison.doubtful)
+        phrase = change_phrase(comparison, comparison.doubtful)
         return f"No change between {names} is sure.", f"Perhaps {phrase}. {comparison.reason} {seen}"
     if comparison.status == "inconclusive":
         return f"{names} cannot be compared.", comparison.reason
@@ -92,22 +95,32 @@ def comparison_sentences(comparison: Comparison) -> tuple[str, str]:
 def _leading_phrase(comparison: Comparison, named: NamedChange) -> str:
     """A change with the number that is surest; of friction all laws of the joint together, where they are known."""
     where = _names_phrase(comparison.arm, named)
-    whole = [
-        each.ratio
-        for each in comparison.changes
-        if each.parameter == ALL_FRICTION and each.joint == named.joint and effect_named(named.effect).cause == FRICTION
-    ]
-    if whole and whole[0] is not None and named.form != ONE_FACTOR:
-        return f"{where} (all friction there {_percents(whole[0])})"
+    whole = _all_friction(comparison, named)
+    if whole is not None:
+        return f"{where} ({whole})"
     if not named.changes:
         return f"{where}: {named.equation}"
-    return f"{where} ({_amount(min(named.changes, key=lambda each: each.p_value))})"
+    return f"{where} ({_amount(min(named.changes, key=lambda each: each.p_value), short=True)})"
 
 
-def change_phrase(arm: Arm, named: NamedChange) -> str:
+def _all_friction(comparison: Comparison, named: NamedChange) -> str | None:
+    """`all friction there +11 % (+2 to +22 %)` of a change of one law of friction, where that is known."""
+    if effect_named(named.effect).cause != FRICTION or named.form == ONE_FACTOR:
+        return None
+    there = (each for each in comparison.changes if each.parameter == ALL_FRICTION and each.joint == named.joint)
+    ratio = next((each.ratio for each in there), None)
+    return None if ratio is None else f"all friction there {_percents(ratio)}"
+
+
+def change_phrase(comparison: Comparison, named: NamedChange) -> str:
     """A change with its numbers: in percent where there is a level, else in units."""
-    where, parts = _names_phrase(arm, named), [_amount(each) for each in named.changes]
+    where, parts = _names_phrase(comparison.arm, named), _amounts(comparison, named)
     return f"{where} ({', '.join(parts)})" if parts else f"{where}: {named.equation}"
+
+
+def _amounts(comparison: Comparison, named: NamedChange) -> list[str]:
+    whole = _all_friction(comparison, named)
+    return [*([] if whole is None else [whole]), *(_amount(each) for each in named.changes)]
 
 
 def _names_phrase(arm: Arm, named: NamedChange) -> str:
@@ -119,18 +132,34 @@ def _names_phrase(arm: Arm, named: NamedChange) -> str:
     return at_place(arm, names, named.effect, named.joint, named.joints)
 
 
-def _amount(change: Change) -> str:
+def _amount(change: Change, short: bool = False) -> str:
+    """A change of a number: in percent where that is well known, else in units. short: not beside both levels."""
     unit, scale = format_unit(change.unit), 1.0
     if change.unit == "m" and abs(change.difference) < MAX_LENGTH_IN_MM:
         unit, scale = "mm", 1e3
-    if change.levels is not None:
-        levels = " to ".join(format_number(scale * value) for value in (change.levels[0], change.levels[-1]))
-        percent = "" if change.ratio is None else f", {_percents(change.ratio)}"
-        return f"{change.parameter} from {levels} {unit}".rstrip() + percent
-    if change.ratio is not None:
-        return f"{change.parameter} {_percents(change.ratio)}"
+    name = number_in_words(change.parameter)
     low, high = (format_number(scale * value) for value in change.interval)
-    return f"{change.parameter} changes by {format_number(scale * change.difference)} ({low} to {high}) {unit}".rstrip()
+    difference = f"{format_number(scale * change.difference)} ({low} to {high}) {unit}".rstrip()
+    if change.levels is not None:
+        first, last = scale * change.levels[0], scale * change.levels[-1]
+        both = f"{name} from {format_number(first)} to {_level(last, first)} {unit}".rstrip()
+        if change.ratio is not None and _is_narrow(change.ratio):
+            return f"{both}, {_percents(change.ratio)}"
+        return both if short else f"{both}, a difference of {difference}"
+    if change.ratio is not None:
+        return f"{name} {_percents(change.ratio)}"
+    return f"{name} changes by {difference}"
+
+
+def _level(value: float, first: float) -> str:
+    """A level in the digits that the first one has."""
+    return "0" if abs(value) < NO_LEVEL * abs(first) else format_number(value)
+
+
+def _is_narrow(ratio: tuple[float, float, float]) -> bool:
+    """Whether a ratio is known well enough to be told in percent."""
+    _, low, high = ratio
+    return 0 < high < MAX_RATIO_SPAN * low
 
 
 def _percents(ratio: tuple[float, float, float]) -> str:
@@ -184,8 +213,10 @@ def comparison_lines(comparison: Comparison) -> Iterator[str]:
     for each in comparison.findings:
         rivals = [rival_in_words(comparison.arm, rival) for rival in each.not_told]
         also = f"; it could also be {join_words(rivals)}" if rivals else ""
-        text = f"{change_phrase(comparison.arm, each)}: {each.equation}, p {format_probability(each.p_value)}{also}"
+        text = f"{change_phrase(comparison, each)}: {each.equation}, p {format_probability(each.p_value)}{also}"
         yield from wrap(text, LINE_WIDTH, initial_indent="  ", subsequent_indent="    ")
+    for step in deciding_steps(comparison):
+        yield from wrap(f"next: {step}", LINE_WIDTH, initial_indent="  ", subsequent_indent="    ")
     for trend in comparison.trends:
         yield from wrap(
             trend_phrase(comparison.arm, trend, comparison.names),
@@ -295,6 +326,7 @@ def comparison_page(comparison: Comparison, command: str) -> str:
         f"What changed between {join_words(comparison.names)}",
         status=kind,
         verdict=comparison_sentences(comparison),
+        steps=list(deciding_steps(comparison)),
         changed=_named_table(comparison) if comparison.findings else None,
         cards=[_card(comparison.arm, each, comparison.names) for each in comparison.findings],
         trends=trend_part(comparison.arm, comparison.trends, comparison.names, comparison.dates),
@@ -306,11 +338,22 @@ def comparison_page(comparison: Comparison, command: str) -> str:
     )
 
 
+def deciding_steps(comparison: Comparison) -> Iterator[str]:
+    """What would tell each change from what else it could be, where any motion does."""
+    for each in comparison.findings:
+        own = {(each.effect, each.joint)}
+        others = [one for one in each.rivals if not one.identical and (one.effect, one.joint) not in own]
+        if others:
+            names = join_words([rival_in_words(comparison.arm, one) for one in others], "or")
+            where = at_place(comparison.arm, effect_in_words(each.effect), each.effect, each.joint, each.joints)
+            yield f"To tell {where} from {names}: {effect_named(each.effect).experiment}."
+
+
 def _named_table(comparison: Comparison) -> Table:
     """What changed, where and by how much, and what else it could be."""
     rows = []
     for each in comparison.findings:
-        amounts = "; ".join(_amount(one) for one in each.changes) or each.equation
+        amounts = "; ".join(_amounts(comparison, each)) or each.equation
         where = place_in_words(comparison.arm, each.effect, each.joint, each.joints)
         rivals = (
             join_words([rival_in_words(comparison.arm, rival) for rival in each.rivals], "or") if each.rivals else "–"
@@ -338,7 +381,7 @@ def _changes_table(arm: Arm, changes: Sequence[Change]) -> Table:
 
 
 def _change_name(change: Change) -> str:
-    return f"{change.parameter}, {effect_in_words(change.effect)}"
+    return f"{number_in_words(change.parameter)}, {effect_in_words(change.effect)}"
 
 
 def _change_row(arm: Arm, change: Change) -> list[str]:

@@ -60,7 +60,12 @@ def _sentences(verdict: VerdictFile) -> Iterator[str]:
 
 
 def _numbers(verdict: VerdictFile) -> Iterator[str]:
-    """Numbers of the summary that have no unit: in brackets stand intervals, whose unit is that of the value before."""
+    """Numbers of the summary that have no unit: in brackets stand intervals, whose unit is that of the value before.
+
+    Where nothing was fitted the summary is the reason, which may hold names of files.
+    """
+    if not verdict.fit:
+        return
     text = PLACE.sub("", re.sub(r"\([^()]*\)", "", verdict.summary))
     for found in NUMBER.finditer(text):
         rest = text[found.end() :]
