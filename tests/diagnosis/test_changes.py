@@ -35,7 +35,7 @@ from armlab.diagnosis.torque.rows.simulation import read_simulation
 from armlab.effects.contract import Scene
 from armlab.effects.drive import TorqueGain, TorqueGainBySign
 from armlab.effects.friction import CoulombFriction, LevelsAndSlopes, Slopes, ViscousFriction
-from armlab.proof.open.relations.variants import one_run
+from armlab.proof.open.relations.variants import one_run, scaled
 from armlab.recordings.load import load_recording
 from armlab.recordings.plain_least_squares import compare_plain
 from armlab.recordings.public import fetch_recording
@@ -409,3 +409,16 @@ def test_a_change_is_told_in_percent_only_where_that_is_well_known() -> None:
     assert _amount(wide, short=True) == "first moment x from 0.1 to 0.16 kg m"
     assert _amount(wide) == "first moment x from 0.1 to 0.16 kg m, a difference of 0.06 (0.05 to 0.07) kg m"
     assert _amount(_change(0.1, -2e-5, None), short=True) == "first moment x from 0.1 to 0 kg m"
+
+
+@pytest.mark.parametrize("scale", [0.5, 0.9, 2.0])
+def test_torque_that_is_read_by_another_scale_has_that_gain_and_nothing_else(scale: float) -> None:
+    old = recording("cold", 0)
+    found = compare(old, scaled(old, 1, scale))
+    (gain,) = found.findings
+    assert (gain.effect, gain.joint) == ("torque_gain_error", 2)
+    (change,) = gain.changes
+    assert change.ratio is not None
+    assert change.ratio[1] < scale < change.ratio[2]
+    assert gain.parameters[0].value == pytest.approx(change.ratio[0])
+    assert change.ratio[0] == pytest.approx(scale, rel=0.03)

@@ -33,6 +33,7 @@ OTHER_STATES = (
     "record the same motion again."
 )
 SHARED = 0.99  # share of the rows from which on all recordings were in the same states
+FOLLOW_ROUNDS = 3  # in which columns follow what is common beside the changes, before names have to agree
 GEOMETRY_TOLERANCE = 1e-6  # rad (m): geometry that counts as that of the same robot
 
 
@@ -171,10 +172,15 @@ def _look(pooled: Pooled, table_of: Callable[[Pooled], ChangeTable]) -> ChangeLo
     table = table_of(pooled)
     few = pooled.shared_share < pooled.tuning.least_shared
     sound = SoundChanges(()) if few else find_sound_changes(pooled, table)
-    if sound.named:
+    for _ in range(FOLLOW_ROUNDS):
+        before = {each.group for each in sound.named}
+        if not before:
+            break
         pooled = follow_levels(pooled, common_values(table, sound.named)[table.model])
         table = table_of(pooled)
         sound = find_sound_changes(pooled, table)
+        if {each.group for each in sound.named} == before:
+            break
     if sound.named or sound.doubtful is not None or pooled.shared_share > SHARED:
         return ChangeLook(pooled, table, sound)
     every = replace(pooled, only_shared=False)

@@ -11,6 +11,7 @@ from armlab.diagnosis.changes.changes import ChangeGroup, ChangeTable, Tested
 from armlab.diagnosis.changes.friction_level import friction_changes
 from armlab.diagnosis.changes.numbers import (
     Change,
+    as_share_of_first,
     as_wide_as_runs,
     between_ends,
     half_width_factor,
@@ -89,6 +90,8 @@ def _name(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: T
     factor = half_width_factor(tested.degrees)
     difference, covariance = between_ends(table, tested)
     covariance = as_wide_as_runs(covariance, scatter_between_runs(table, chosen, tested.group).variances())
+    if group.candidate.facts.scales_torque:
+        difference, covariance = as_share_of_first(pooled, table, tested, difference, covariance)
     law = next(iter(moved_laws(table, tested)), group.candidate)
     if group.laws or group.whole_law or group.parts:
         changes = tuple(each for each in changes if each.changed or not group.parts)

@@ -26,6 +26,7 @@ from armlab.proof.open.relations.variants import (
     parts_of,
     resampled,
     rewritten,
+    scaled,
     spoilt,
     thinned,
     with_noise,
@@ -39,6 +40,7 @@ from armlab.report.verdict_files import make_verdict
 STRETCH_S = (1.0, 2.0, 3.0)  # odd against even: the shortest stretches that can be filtered
 MIRROR_TOLERANCE = 0.05  # of a change, between one direction and the other
 NUMBER_TOLERANCE = 0.02  # of a parameter, between two ways to write one recording
+SCALES = (0.5, 0.9, 2.0)  # by which torque is read
 ROUNDING = 1e-9
 
 
@@ -221,6 +223,23 @@ def added_law_is_found(recording: Recording, desk: Desk) -> tuple[bool | None, s
     return bool(friction & set(classes)) and not rest.findings, f"viscous friction at joint {joint + 1}: {named} named"
 
 
+def another_scale_is_a_gain(recording: Recording, desk: Desk) -> tuple[bool | None, str]:
+    """Torque of a joint that is read by another scale has another gain, of that size, and nothing else has changed."""
+    joint, holds, said = loaded_joint(recording), True, list[str]()
+    for scale in SCALES:
+        found = desk.compare(recording, scaled(recording, joint, scale))
+        if found.status == "inconclusive":
+            return None, found.reason
+        gains = [each.ratio for each in found.changes if each.changed and each.parameter == "gain"]
+        only = [(each.effect, each.joint) for each in found.findings] == [("torque_gain_error", joint + 1)]
+        right = only and all(ratio is not None and ratio[1] <= scale <= ratio[2] for ratio in gains)
+        holds &= right
+        names = ", ".join(f"{each.effect}@{each.joint}" for each in found.findings) or "nothing"
+        sizes = " ".join(f"{ratio[0]:.3g} ({ratio[1]:.3g} to {ratio[2]:.3g})" for ratio in gains if ratio is not None)
+        said.append(f"times {scale:g}: {names} {sizes}".rstrip())
+    return holds, "; ".join(said)
+
+
 def what_is_seen_plainly_is_named(recording: Recording, desk: Desk) -> tuple[bool | None, str]:
     """Where plain least squares sees a change, the comparison does not say "same"; where nothing changed, it sees none.
 
@@ -301,6 +320,7 @@ RELATIONS: dict[str, Relation] = {
     "units, order, names, clock": same_however_written,
     "fewer rows replace no name": fewer_rows_replace_no_name,
     "added law found, and gone again": added_law_is_found,
+    "torque of another scale is a gain": another_scale_is_a_gain,
     "what is seen plainly is named": what_is_seen_plainly_is_named,
     "no finding raises the held-out error": findings_help,
     "predicts as well as identification": predicts_as_well_as_identification,

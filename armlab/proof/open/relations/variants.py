@@ -100,13 +100,18 @@ def parts_of(recording: Recording) -> Iterator[tuple[str, Recording]]:
     yield from ((name, each) for name, each in cut.items() if 0 < sum(run.samples for run in each.runs) < rows)
 
 
+def scaled(recording: Recording, joint: int, scale: float) -> Recording:
+    """The torque of a joint (from 0) read by another scale."""
+    factors = np.where(np.arange(len(recording.arm)) == joint, scale, 1.0)
+    runs = [run.with_signals(run.time, {"torque": factors * run.torque}) for run in recording.runs]
+    return with_runs(recording, runs)
+
+
 def spoilt(recording: Recording) -> Iterator[tuple[str, Recording]]:
     """Copies whose torque is wrong, with a name for each: of one joint too small or too large, of all joints noisy."""
     joint, rng = loaded_joint(recording), np.random.default_rng(0)
     for scale in SPOILT_SCALES:
-        factors = np.where(np.arange(len(recording.arm)) == joint, scale, 1.0)
-        runs = [run.with_signals(run.time, {"torque": factors * run.torque}) for run in recording.runs]
-        yield f"torque of joint {joint + 1} times {scale:g}", with_runs(recording, runs)
+        yield f"torque of joint {joint + 1} times {scale:g}", scaled(recording, joint, scale)
     noisy = []
     for run in recording.runs:
         noise = SPOILT_NOISE * np.std(run.torque, axis=0) * rng.standard_normal(run.torque.shape)
