@@ -20,7 +20,6 @@ from armlab.diagnosis.tuning import ComparisonTuning
 from armlab.effects.contract import Candidate
 
 NO_COLUMNS = np.empty(0, dtype=np.intp)
-LEAST_SCALE = 0.05  # of the torque in the middle of all recordings: no drive is read with the other sign
 LEAST_TORQUE = 1e-9  # N m (N): of a joint whose drive reports none
 SHAPE_STEP = 0.05  # of a nonlinear parameter, for derivatives: a gap's torque has corners
 
@@ -185,17 +184,11 @@ class ChangeTable:
         sizes = self.contrast @ values.T
         if float(np.ptp(sizes)) < group.least:
             return False
-        if self._is_absurd(group, sizes):
+        plain = not group.laws and not group.whole_law and not group.candidate.facts.scales_torque
+        if plain and any(group.candidate.absurdity(each) for each in sizes[1:] - sizes[0]):
             return False
         enough = tested.evidence > self.tuning.least_evidence
         return enough and tested.p_value * len(self.groups) < self.tuning.level
-
-    def _is_absurd(self, group: ChangeGroup, sizes: Array) -> bool:
-        """Whether no arm changes by so much. sizes: (recordings, coefficients). A drive may be read in another unit."""
-        if group.candidate.facts.scales_torque:
-            return float(np.min(1 + sizes)) < LEAST_SCALE
-        plain = not group.laws and not group.whole_law
-        return plain and any(group.candidate.absurdity(each) for each in sizes[1:] - sizes[0])
 
 
 def _log_bayes_factor(data: Array, towards: Array, scales: Array) -> float:

@@ -138,12 +138,13 @@ def compare_with(
             return replace(none, reason=f"{failed.recording.name}: {failed.reason}")
         progress("looking for other changes")
         try:
-            pooled = pool_recordings(recordings, unite_candidates(diagnoses), simulation, settings)
+            rich = _look(pool_recordings(recordings, unite_candidates(diagnoses), simulation, settings), make_table)
         except DataError as error:
-            return replace(none, reason=str(error))
-        plainly, seen = seen, _look(pooled, make_table)
-        if plainly is not None and plainly.sound.elsewhere and not seen.sound.named:
-            seen = plainly
+            if seen is None:
+                return replace(none, reason=str(error))
+            rich = seen  # what links and friction show is all that these recordings tell
+        if seen is None or rich.sound.named or not seen.sound.elsewhere:
+            seen = rich
     return conclude(seen, recordings, diagnoses, tuple(_notes(recordings, baseline)), dates)
 
 
@@ -154,6 +155,11 @@ class ChangeLook:
     pooled: Pooled
     table: ChangeTable
     sound: SoundChanges
+
+    @property
+    def groups(self) -> set[int]:
+        """Of the named changes."""
+        return {each.group for each in self.sound.named}
 
 
 def look_plainly(recordings: Sequence[Recording], simulation: Simulation, settings: Settings) -> ChangeLook | None:
@@ -172,24 +178,29 @@ def _look(pooled: Pooled, table_of: Callable[[Pooled], ChangeTable]) -> ChangeLo
     table = table_of(pooled)
     few = pooled.shared_share < pooled.tuning.least_shared
     sound = SoundChanges(()) if few else find_sound_changes(pooled, table)
-    for _ in range(FOLLOW_ROUNDS):
-        before = {each.group for each in sound.named}
-        if not before:
-            break
-        pooled = follow_levels(pooled, common_values(table, sound.named)[table.model])
-        table = table_of(pooled)
-        sound = find_sound_changes(pooled, table)
-        if {each.group for each in sound.named} == before:
-            break
-    if sound.named or sound.doubtful is not None or pooled.shared_share > SHARED:
-        return ChangeLook(pooled, table, sound)
+    look = _followed(ChangeLook(pooled, table, sound), table_of)
+    if look.sound.named or look.sound.doubtful is not None or pooled.shared_share > SHARED:
+        return look
     every = replace(pooled, only_shared=False)
     table_of_all = table_of(every)
     found = find_sound_changes(every, table_of_all).named
     surest = max(found, key=table_of_all.log_odds, default=None)
     if surest is None:
-        return ChangeLook(pooled, table, sound)
+        return look
     return ChangeLook(every, table_of_all, SoundChanges((), surest, elsewhere=True))
+
+
+def _followed(look: ChangeLook, table_of: Callable[[Pooled], ChangeTable]) -> ChangeLook:
+    """The look with columns that follow what is common beside its names, until these stay; if they do not, once."""
+    looks = [look]
+    while looks[-1].sound.named and len(looks) <= FOLLOW_ROUNDS:
+        last = looks[-1]
+        pooled = follow_levels(last.pooled, common_values(last.table, last.sound.named)[last.table.model])
+        table = table_of(pooled)
+        looks.append(ChangeLook(pooled, table, find_sound_changes(pooled, table)))
+        if looks[-1].groups == last.groups:
+            return looks[-1]
+    return looks[min(1, len(looks) - 1)]
 
 
 def conclude(

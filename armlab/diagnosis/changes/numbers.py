@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from armlab.common.arrays import Array
 from armlab.common.probabilities import student_quantile
 from armlab.diagnosis.changes.between_runs import scatter_between_runs
-from armlab.diagnosis.changes.changes import LEAST_SCALE, ChangeTable, Tested
+from armlab.diagnosis.changes.changes import ChangeTable, Tested
 from armlab.diagnosis.changes.pooled import Pooled, is_body
 from armlab.diagnosis.torque.columns.columns import place_of
 from armlab.effects.contract import Candidate, Value
@@ -92,20 +92,24 @@ def between_ends(table: ChangeTable, tested: Tested) -> tuple[Array, Array]:
     return values, np.einsum("iajb,a,b->ij", covariance, ends, ends)
 
 
-def as_share_of_first(
-    pooled: Pooled, table: ChangeTable, tested: Tested, difference: Array, covariance: Array
-) -> tuple[Array, Array]:
-    """Last less first recording of a scale, and its covariance, as a share of the torque of the first.
+def mean_of_scale(pooled: Pooled, table: ChangeTable, tested: Tested) -> Array:
+    """The mean torque of the first and the last recording over that of the common model, whose share a scale is.
 
-    A scale is fitted as a share of the torque of the common model. That is about the mean torque of all recordings, but
-    for what drift within the runs stands for.
+    (coefficients,); about one, but for what drift within the runs stands for.
     """
     group, own = table.groups[tested.group], recording_values(table, tested)
     columns, torque = group.block.values[:, 0], pooled.observed.torque[:, group.candidate.rows[0]]
     common = torque - np.sum(columns * own[pooled.members], axis=1)
-    middle = common @ columns / np.sum(columns**2, axis=0) + (own[0] + own[-1]) / 2
-    first = np.maximum(middle - difference / 2, LEAST_SCALE * np.abs(middle))
-    slope = middle / first**2
+    return np.asarray(common @ columns / np.sum(columns**2, axis=0) + (own[0] + own[-1]) / 2)
+
+
+def as_share_of_first(mean: Array, difference: Array, covariance: Array) -> tuple[Array, Array]:
+    """Last less first recording of a scale, and its covariance, as a share of the torque of the first.
+
+    mean: `mean_of_scale`.
+    """
+    first = mean - difference / 2
+    slope = mean / first**2
     return difference / first, covariance * np.outer(slope, slope)
 
 
@@ -128,7 +132,7 @@ def list_changes(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], te
         changed = not moved or law.candidate in moved
         difference, spread = own[-1] - own[0], slopes @ covariance @ slopes.T
         if law.candidate.facts.scales_torque:
-            difference, spread = as_share_of_first(pooled, table, tested, difference, spread)
+            difference, spread = as_share_of_first(mean_of_scale(pooled, table, tested), difference, spread)
         for each in _parameters(table, tested, law, own, difference, spread):
             yield replace(each, changed=each.changed and changed)
 

@@ -9,7 +9,13 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.changes.between_runs import scatter_between_runs
 from armlab.diagnosis.changes.change_search import find_changes, held_out_errors
 from armlab.diagnosis.changes.changes import ChangeTable, Tested
-from armlab.diagnosis.changes.numbers import between_ends, half_width_factor, laws_of, recording_values
+from armlab.diagnosis.changes.numbers import (
+    between_ends,
+    half_width_factor,
+    laws_of,
+    mean_of_scale,
+    recording_values,
+)
 from armlab.diagnosis.changes.pooled import Pooled, is_body
 from armlab.diagnosis.torque.search.fitted_model import inertial_parameters
 from armlab.effects.contract import Scene
@@ -18,6 +24,7 @@ from armlab.effects.term import SIGN_SIGMAS
 from problem.motion import Motion
 
 INERTIA_STATES = 50  # a run
+LEAST_MEAN = 0.5  # of the torque that the common model tells: less is not the torque that was recorded
 
 
 @dataclass(frozen=True)
@@ -82,6 +89,8 @@ def reason_impossible(pooled: Pooled, table: ChangeTable, found: Sequence[Tested
     if is_body(group.candidate):
         return _reason_no_body(pooled, table, tested)
     _, covariance = between_ends(table, tested)
+    if group.candidate.facts.scales_torque:
+        return _reason_no_scale(pooled, table, tested)
     if group.parts:
         return _reason_driving(pooled, table, found, tested, covariance)
     for law, own, of_group in laws_of(pooled, table, found, tested):
@@ -94,6 +103,14 @@ def reason_impossible(pooled: Pooled, table: ChangeTable, found: Sequence[Tested
         if reason is not None:
             return reason
     return None
+
+
+def _reason_no_scale(pooled: Pooled, table: ChangeTable, tested: Tested) -> str | None:
+    """What speaks against a gain: torque that the common model does not tell, or that changes its sign."""
+    mean, (difference, _) = mean_of_scale(pooled, table, tested), between_ends(table, tested)
+    if np.any(mean < LEAST_MEAN):
+        return "the common model does not tell the torque of the joint"
+    return "torque would change its sign" if np.any(np.abs(difference) >= 2 * mean) else None
 
 
 def _reason_driving(
