@@ -22,9 +22,10 @@ from shipped_schemas import check_against_schema
 from small_recordings import ARM, VISCOUS, frame, motion_at, recording_in
 
 from armlab.cli.main import main
+from armlab.common.errors import DataError
 from armlab.common.statistics import adjust_by_holm
 from armlab.diagnosis.changes import soundness
-from armlab.diagnosis.changes.comparison import Comparison, compare, look_plainly
+from armlab.diagnosis.changes.comparison import Comparison, compare, compare_with, look_plainly
 from armlab.diagnosis.changes.friction_level import ALL_FRICTION
 from armlab.diagnosis.changes.numbers import Change, laws_of
 from armlab.diagnosis.changes.pooled import pool_plainly, unite_candidates
@@ -337,6 +338,19 @@ def test_a_recording_that_allows_no_verdict_allows_no_comparison(tmp_path: Path)
     found = compare(recording("cold", 0), short)
     assert found.status == "inconclusive"
     assert "too short" in " ".join(comparison_sentences(found))
+
+
+def test_links_and_friction_answer_alone_where_motion_is_too_short_for_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*given: object) -> None:
+        raise DataError("joint 1 is never in motion for 1.8 s on end")
+
+    monkeypatch.setattr("armlab.diagnosis.changes.comparison.pool_recordings", refuse)
+    diagnoses = comparison("same").diagnoses
+    old, again = recording("cold", 0), recording("again", 10)
+    assert compare_with((old, again), lambda: diagnoses, None, ()).status == "same"
+    monkeypatch.setattr("armlab.diagnosis.changes.comparison.look_plainly", lambda *given: None)
+    refused = compare_with((old, again), lambda: diagnoses, None, ())
+    assert (refused.status, refused.reason) == ("inconclusive", "joint 1 is never in motion for 1.8 s on end")
 
 
 def test_json_and_terminal_tell_the_change(tmp_path: Path) -> None:
