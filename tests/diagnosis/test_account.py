@@ -24,6 +24,7 @@ from armlab.diagnosis.torque.names.findings import (
     with_minor_ones,
     without_lesser_unknowns,
 )
+from armlab.diagnosis.torque.predict.joint_friction import _Sized
 from armlab.diagnosis.torque.predict.parts import (
     _rows_and_units,
     add_in_order,
@@ -31,6 +32,7 @@ from armlab.diagnosis.torque.predict.parts import (
     stack_in_units,
     weigh_claims,
 )
+from armlab.diagnosis.torque.rows.data import Segment
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_background
 from armlab.effects.contract import UNKNOWN, Effect
 from armlab.effects.library import effect_named, library
@@ -194,6 +196,18 @@ def test_a_joint_without_torque_counts_in_units_of_the_largest() -> None:
     torque = np.array([[3.0, 0.0], [-3.0, 1e-12]])
     observed: Any = SimpleNamespace(joints=2, torque=torque, rows_held_out=lambda joint: np.array([True, True]))
     assert _rows_and_units(observed)[1].tolist() == [3.0, 3.0]
+
+
+def test_friction_is_told_at_speeds_of_the_motion_though_the_joint_rests_for_most_of_the_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    velocity = np.concatenate([np.full(80, 1e-9), np.linspace(0.1, 1.0, 20)])[:, None]
+    whole = (Segment(0, "identify", 0, 100),)
+    observed = SimpleNamespace(rows=100, used=lambda joint: whole, kept=lambda name: velocity)
+    model: Any = SimpleNamespace(design=SimpleNamespace(observed=observed, settings=Settings()))
+    monkeypatch.setattr(_Sized, "_size", lambda sized, joint, groups, speed: (speed, 0.0))
+    found = _Sized(model, model).friction(1, ())
+    assert found.speeds == pytest.approx(tuple(np.quantile(velocity[80:], (0.1, 0.9))))
 
 
 def test_slow_speeds_are_told_in_thousandths() -> None:

@@ -44,6 +44,10 @@ class _Sized:
     def friction(self, joint: int, groups: Sequence[int]) -> JointFriction:
         observed = self.model.design.observed
         speed = np.abs(self._velocity[rows_in(observed.used(joint - 1), observed.rows), joint - 1])
+        tuning = self.model.design.settings.tuning.data
+        creeping = tuning.creep_ratio * np.quantile(speed, tuning.high_speed_quantile)
+        if np.quantile(speed, SPEED_QUANTILES[0]) < creeping:  # it counts as moving all the time, and rests
+            speed = speed[speed >= creeping]
         low, high = (float(each) for each in np.quantile(speed, SPEED_QUANTILES))
         (first, first_half), (last, last_half) = (self._size(joint, groups, each) for each in (low, high))
         ends = ((first - first_half, first + first_half), (last - last_half, last + last_half))
