@@ -27,7 +27,7 @@ from armlab.common.statistics import adjust_by_holm
 from armlab.diagnosis.changes import soundness
 from armlab.diagnosis.changes.comparison import Comparison, compare, compare_with, look_plainly
 from armlab.diagnosis.changes.friction_level import ALL_FRICTION
-from armlab.diagnosis.changes.numbers import Change, laws_of
+from armlab.diagnosis.changes.numbers import Change, as_share_of_first, laws_of
 from armlab.diagnosis.changes.pooled import pool_plainly, unite_candidates
 from armlab.diagnosis.result import Rival
 from armlab.diagnosis.settings import Settings
@@ -436,3 +436,17 @@ def test_torque_that_is_read_by_another_scale_has_that_gain_and_nothing_else(sca
     assert change.ratio[1] < scale < change.ratio[2]
     assert gain.parameters[0].value == pytest.approx(change.ratio[0])
     assert change.ratio[0] == pytest.approx(scale, rel=0.03)
+
+
+@pytest.mark.parametrize(("difference", "share"), [(0.4, 0.5), (-0.4, -1 / 3), (2.0, None), (-3.0, None)])
+def test_a_scale_is_a_share_of_the_first_recording_where_that_has_torque(
+    difference: float, share: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("armlab.diagnosis.changes.numbers.mean_of_scale", lambda *given: np.ones(1))
+    table: Any = SimpleNamespace(groups=[SimpleNamespace(candidate=TorqueGain.at(ARM, 2))])
+    tested: Any = SimpleNamespace(group=0)
+    found = as_share_of_first(table, table, tested, np.array([difference]), np.eye(1))
+    assert (found is None) == (share is None)
+    if found is not None:
+        assert found[0] == pytest.approx([share])
+        assert found[1] == pytest.approx(np.eye(1) / (1 - difference / 2) ** 4)

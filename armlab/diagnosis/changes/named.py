@@ -16,7 +16,6 @@ from armlab.diagnosis.changes.numbers import (
     between_ends,
     half_width_factor,
     list_changes,
-    mean_of_scale,
     moved_laws,
 )
 from armlab.diagnosis.changes.pooled import Pooled, is_body
@@ -91,8 +90,9 @@ def _name(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: T
     factor = half_width_factor(tested.degrees)
     difference, covariance = between_ends(table, tested)
     covariance = as_wide_as_runs(covariance, scatter_between_runs(table, chosen, tested.group).variances())
-    if group.candidate.facts.scales_torque:
-        difference, covariance = as_share_of_first(mean_of_scale(pooled, table, tested), difference, covariance)
+    ends = as_share_of_first(pooled, table, tested, difference, covariance)
+    assert ends is not None  # sound changes leave torque to the first recording (`reason_impossible`)
+    difference, covariance = ends
     law = next(iter(moved_laws(table, tested)), group.candidate)
     if group.laws or group.whole_law or group.parts:
         changes = tuple(each for each in changes if each.changed or not group.parts)

@@ -103,12 +103,19 @@ def mean_of_scale(pooled: Pooled, table: ChangeTable, tested: Tested) -> Array:
     return np.asarray(common @ columns / np.sum(columns**2, axis=0) + (own[0] + own[-1]) / 2)
 
 
-def as_share_of_first(mean: Array, difference: Array, covariance: Array) -> tuple[Array, Array]:
-    """Last less first recording of a scale, and its covariance, as a share of the torque of the first.
+def as_share_of_first(
+    pooled: Pooled, table: ChangeTable, tested: Tested, difference: Array, covariance: Array
+) -> tuple[Array, Array] | None:
+    """Last less first recording, and its covariance: of a scale as a share of the torque of the first recording.
 
-    mean: `mean_of_scale`.
+    None where the first recording would have no torque, so that there is no share of it.
     """
+    if not table.groups[tested.group].candidate.facts.scales_torque:
+        return difference, covariance
+    mean = mean_of_scale(pooled, table, tested)
     first = mean - difference / 2
+    if np.any(np.abs(difference) >= 2 * mean):
+        return None
     slope = mean / first**2
     return difference / first, covariance * np.outer(slope, slope)
 
@@ -130,10 +137,8 @@ def list_changes(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], te
     moved = moved_laws(table, tested)
     for law, own, slopes in laws_of(pooled, table, found, tested):
         changed = not moved or law.candidate in moved
-        difference, spread = own[-1] - own[0], slopes @ covariance @ slopes.T
-        if law.candidate.facts.scales_torque:
-            difference, spread = as_share_of_first(mean_of_scale(pooled, table, tested), difference, spread)
-        for each in _parameters(table, tested, law, own, difference, spread):
+        ends = as_share_of_first(pooled, table, tested, own[-1] - own[0], slopes @ covariance @ slopes.T)
+        for each in () if ends is None else _parameters(table, tested, law, own, *ends):
             yield replace(each, changed=each.changed and changed)
 
 
