@@ -9,6 +9,7 @@ from itertools import combinations
 from pathlib import Path
 from tempfile import mkdtemp
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
