@@ -93,9 +93,10 @@ def between_ends(table: ChangeTable, tested: Tested) -> tuple[Array, Array]:
 
 
 def mean_of_scale(pooled: Pooled, table: ChangeTable, tested: Tested) -> Array:
-    """The mean torque of the first and the last recording over that of the common model, whose share a scale is.
+    """The mean torque of the first and the last recording, divided by the torque of the common model: (coefficients,).
 
-    (coefficients,); about one, but for what drift within the runs stands for.
+    A scale is fitted as a share of the torque of the common model. The ratio is about one; it differs from one where
+    drift within the runs takes a part of the torque.
     """
     group, own = table.groups[tested.group], recording_values(table, tested)
     columns, torque = group.block.values[:, 0], pooled.observed.torque[:, group.candidate.rows[0]]
@@ -106,9 +107,9 @@ def mean_of_scale(pooled: Pooled, table: ChangeTable, tested: Tested) -> Array:
 def as_share_of_first(
     pooled: Pooled, table: ChangeTable, tested: Tested, difference: Array, covariance: Array
 ) -> tuple[Array, Array] | None:
-    """Last less first recording, and its covariance: of a scale as a share of the torque of the first recording.
+    """The difference between the ends and its covariance; of a scale, as a share of the torque of the first recording.
 
-    None where the first recording would have no torque, so that there is no share of it.
+    difference: last less first recording. None where the first recording would have no torque.
     """
     if not table.groups[tested.group].candidate.facts.scales_torque:
         return difference, covariance

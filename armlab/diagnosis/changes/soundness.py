@@ -24,7 +24,7 @@ from armlab.effects.term import SIGN_SIGMAS
 from problem.motion import Motion
 
 INERTIA_STATES = 50  # a run
-LEAST_MEAN = 0.5  # of the torque that the common model tells: less is not the torque that was recorded
+LEAST_TORQUE_TOLD = 0.5  # recorded torque over that of the common model: below it the model tells another torque
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def reason_impossible(pooled: Pooled, table: ChangeTable, found: Sequence[Tested
 def _reason_no_scale(pooled: Pooled, table: ChangeTable, tested: Tested) -> str | None:
     """What speaks against a gain: torque that the common model does not tell, or that changes its sign."""
     mean, (difference, _) = mean_of_scale(pooled, table, tested), between_ends(table, tested)
-    if np.any(mean < LEAST_MEAN):
+    if np.any(mean < LEAST_TORQUE_TOLD):
         return "the common model does not tell the torque of the joint"
     return "torque would change its sign" if np.any(np.abs(difference) >= 2 * mean) else None
 
