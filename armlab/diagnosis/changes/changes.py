@@ -73,8 +73,8 @@ class ChangeTable:
     """The model of all recordings. contrast: (recordings, columns a coefficient).
 
     common: columns that all share. model: those of them that the common model has; the others stand beside changes.
-    any_scale: whether a scale may have changed by more than arms have. That shows beside links and friction alone; in a
-    richer model a large scale makes up for a law that follows a change badly.
+    any_reading: whether the scale or the time of the torque may have changed by more than arms have. That shows beside
+    links and friction alone; in a richer model a large scale makes up for a law that follows a change badly.
     """
 
     mixed: MixedModel
@@ -83,7 +83,7 @@ class ChangeTable:
     groups: tuple[ChangeGroup, ...]
     contrast: Array
     tuning: ComparisonTuning
-    any_scale: bool = False
+    any_reading: bool = False
 
     def columns_with(self, chosen: Sequence[int]) -> NDArray[np.intp]:
         """The common columns and those of chosen groups."""
@@ -188,7 +188,8 @@ class ChangeTable:
         if float(np.ptp(sizes)) < group.least:
             return False
         plain = not group.laws and not group.whole_law
-        bounded = plain and not (self.any_scale and group.candidate.facts.scales_torque)
+        of_reading = group.candidate.facts.scales_torque or _is_shift(group.candidate)
+        bounded = plain and not (self.any_reading and of_reading)
         if bounded and any(group.candidate.absurdity(each) for each in sizes[1:] - sizes[0]):
             return False
         enough = tested.evidence > self.tuning.least_evidence
@@ -230,7 +231,8 @@ def make_table(pooled: Pooled) -> ChangeTable:
 def make_plain_table(pooled: Pooled) -> ChangeTable:
     """The same with Coulomb and viscous friction of a joint as one cause, by one factor or each by its own change.
 
-    Shifts in time are no changes here: below its cut-off they look like what friction leaves at each reversal.
+    A shift in time of one joint is no change here: below the cut-off it looks like what friction leaves at each
+    reversal. One of all torques is seen at all joints.
     """
     parts = _CommonColumns(pooled)
     friction: dict[int, list[Block]] = {}
@@ -239,11 +241,11 @@ def make_plain_table(pooled: Pooled) -> ChangeTable:
         joint = block.candidate.joint
         if joint is not None and block.candidate.is_friction_of(joint):
             friction.setdefault(joint, []).append(block)
-        elif not _is_shift(block.candidate):
+        elif joint is None or not _is_shift(block.candidate):
             others.append(block)
     causes = [(each,) for each in others] + [tuple(each) for each in friction.values()]
     table = _finish_table(parts, [*(parts.offer(each) for each in causes), *_friction_by_one_factor(pooled)])
-    return replace(table, any_scale=True)
+    return replace(table, any_reading=True)
 
 
 def _friction_by_one_factor(pooled: Pooled) -> list[_Offer]:

@@ -18,6 +18,7 @@ from armlab.diagnosis.torque.predict.found_model import model_found
 from armlab.identification.model_file import model_text
 from armlab.proof.open.real_folders.consistency import contradictions
 from armlab.proof.open.relations.variants import (
+    delayed,
     every_other_second,
     fewer_rows,
     half,
@@ -41,6 +42,7 @@ STRETCH_S = (1.0, 2.0, 3.0)  # odd against even: the shortest stretches that can
 MIRROR_TOLERANCE = 0.05  # of a change, between one direction and the other
 NUMBER_TOLERANCE = 0.02  # of a parameter, between two ways to write one recording
 SCALES = (0.5, 0.9, 2.0)  # by which torque is read
+DELAYS_ROWS, DELAY_TOLERANCE = (2, 4), 0.25  # of torque against motion; of such a delay: jumps of friction hide some
 ROUNDING = 1e-9
 
 
@@ -240,6 +242,23 @@ def another_scale_is_a_gain(recording: Recording, desk: Desk) -> tuple[bool | No
     return holds, "; ".join(said)
 
 
+def late_torque_is_a_delay(recording: Recording, desk: Desk) -> tuple[bool | None, str]:
+    """Torque that is recorded later by some rows has a delay of about that size, and nothing else has changed."""
+    holds, said = True, list[str]()
+    for rows in DELAYS_ROWS:
+        late = rows / min(run.rate_hz for run in recording.runs)
+        found = desk.compare(recording, delayed(recording, late))
+        if found.status == "inconclusive":
+            return None, found.reason
+        delays = [each.difference for each in found.changes if each.changed and each.effect == "time_delay"]
+        holds &= len(found.findings) == len(delays) == 1 and all(
+            abs(each / late - 1) < DELAY_TOLERANCE for each in delays
+        )
+        names = ", ".join(f"{each.effect}@{each.joint}" for each in found.findings) or "nothing"
+        said.append(f"{late:.3g} s: {names} {' '.join(f'{each:.3g}' for each in delays)}".rstrip())
+    return holds, "; ".join(said)
+
+
 def what_is_seen_plainly_is_named(recording: Recording, desk: Desk) -> tuple[bool | None, str]:
     """Where plain least squares sees a change, the comparison does not say "same"; where nothing changed, it sees none.
 
@@ -321,6 +340,7 @@ RELATIONS: dict[str, Relation] = {
     "fewer rows replace no name": fewer_rows_replace_no_name,
     "added law found, and gone again": added_law_is_found,
     "torque of another scale is a gain": another_scale_is_a_gain,
+    "late torque is a delay": late_torque_is_a_delay,
     "what is seen plainly is named": what_is_seen_plainly_is_named,
     "no finding raises the held-out error": findings_help,
     "predicts as well as identification": predicts_as_well_as_identification,

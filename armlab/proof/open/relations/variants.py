@@ -107,6 +107,15 @@ def scaled(recording: Recording, joint: int, scale: float) -> Recording:
     return with_runs(recording, runs)
 
 
+def delayed(recording: Recording, seconds: float) -> Recording:
+    """The torque of all joints recorded later than the motion."""
+    runs = []
+    for run in recording.runs:
+        late = [np.interp(run.time - seconds, run.time, each) for each in run.torque.T]
+        runs.append(run.with_signals(run.time, {"torque": np.column_stack(late)}))
+    return with_runs(recording, runs)
+
+
 def spoilt(recording: Recording) -> Iterator[tuple[str, Recording]]:
     """Copies whose torque is wrong, with a name for each: of one joint too small or too large, of all joints noisy."""
     joint, rng = loaded_joint(recording), np.random.default_rng(0)
