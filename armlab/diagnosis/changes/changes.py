@@ -232,7 +232,7 @@ def make_plain_table(pooled: Pooled) -> ChangeTable:
     """The same with Coulomb and viscous friction of a joint as one cause, by one factor or each by its own change.
 
     A shift in time of one joint is no change here: below the cut-off it looks like what friction leaves at each
-    reversal. One of all torques is seen at all joints.
+    reversal. One of all torques is seen at all of several joints.
     """
     parts = _CommonColumns(pooled)
     friction: dict[int, list[Block]] = {}
@@ -241,7 +241,7 @@ def make_plain_table(pooled: Pooled) -> ChangeTable:
         joint = block.candidate.joint
         if joint is not None and block.candidate.is_friction_of(joint):
             friction.setdefault(joint, []).append(block)
-        elif joint is None or not _is_shift(block.candidate):
+        elif len(block.candidate.rows) > 1 or not _is_shift(block.candidate):
             others.append(block)
     causes = [(each,) for each in others] + [tuple(each) for each in friction.values()]
     table = _finish_table(parts, [*(parts.offer(each) for each in causes), *_friction_by_one_factor(pooled)])
