@@ -37,7 +37,7 @@ from armlab.diagnosis.torque.rows.simulation import read_simulation
 from armlab.effects.contract import Scene
 from armlab.effects.drive import TorqueGain, TorqueGainBySign
 from armlab.effects.friction import CoulombFriction, LevelsAndSlopes, Slopes, ViscousFriction
-from armlab.proof.open.relations.variants import one_run, scaled
+from armlab.proof.open.relations.variants import delayed, one_run, scaled
 from armlab.recordings.load import load_recording
 from armlab.recordings.plain_least_squares import compare_plain
 from armlab.recordings.public import fetch_recording
@@ -437,6 +437,16 @@ def test_torque_that_is_read_by_another_scale_has_that_gain_and_nothing_else(sca
     assert change.ratio[1] < scale < change.ratio[2]
     assert gain.parameters[0].value == pytest.approx(change.ratio[0])
     assert change.ratio[0] == pytest.approx(scale, rel=0.03)
+
+
+@pytest.mark.parametrize("seconds", [0.01, -0.05])
+def test_torque_that_is_recorded_later_has_that_delay_and_nothing_else(seconds: float) -> None:
+    old = recording("cold", 0)
+    found = compare(old, delayed(old, seconds))
+    (late,) = found.findings
+    assert (late.effect, late.joint) == ("time_delay", None)
+    (change,) = late.changes
+    assert change.difference == pytest.approx(seconds, rel=0.1)
 
 
 @pytest.mark.parametrize(("difference", "share"), [(0.4, 0.5), (-0.4, -1 / 3), (2.0, None), (-3.0, None)])
