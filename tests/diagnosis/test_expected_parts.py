@@ -17,7 +17,7 @@ from armlab.diagnosis.torque.names.expected_parts import claim_expected_parts
 from armlab.diagnosis.torque.predict.prediction import fit_prediction
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_background
 from armlab.diagnosis.torque.search.search import FailedTest
-from armlab.effects.library import library
+from armlab.effects.library import effect_named, library
 from problem.motion import Motion
 
 
@@ -62,7 +62,7 @@ def test_a_joint_whose_friction_is_named_gets_no_second_law(nothing_named: Fitte
     assert claim_expected_parts(belief) is belief
 
 
-def test_friction_whose_law_has_numbers_that_nobody_believes_is_claimed_without_the_name_of_that_law(
+def test_friction_whose_law_has_numbers_that_nobody_believes_is_claimed_as_friction_of_no_formula(
     nothing_named: FittedModel,
 ) -> None:
     law = group_at_joint_2(nothing_named, "nonlinear_viscous_friction")
@@ -75,6 +75,12 @@ def test_friction_whose_law_has_numbers_that_nobody_believes_is_claimed_without_
         claimed = claim_expected_parts(belief)
     assert set(claimed.effects) == {law}
     assert claimed.present == {}
-    names = [(each.effect, each.joint) for each in claimed.weighed[law]]
-    assert ("viscous_friction", 2) in names
-    assert ("nonlinear_viscous_friction", 2) not in names
+    assert [each.effect for each in claimed.weighed[law]] == ["unknown"]
+
+
+def test_friction_that_predictions_need_is_friction_of_its_joint_by_whatever_law(nothing_named: FittedModel) -> None:
+    belief = claim_expected_parts(Belief(nothing_named, prediction=fit_prediction(nothing_named)))
+    ((_, names),) = belief.weighed.items()
+    laws = [each for each in names if each.effect != "unknown"]
+    assert {each.joint for each in laws} == {2}
+    assert {effect_named(each.effect).cause for each in laws} == {"friction"}

@@ -8,6 +8,7 @@ present without a claim no longer disturbs it.
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
+from armlab.diagnosis.result import WeighedName
 from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.solver import State
 from armlab.diagnosis.torque.evidence.evidence import Evidence, Judge
@@ -17,47 +18,69 @@ from armlab.diagnosis.torque.names.weighing import weigh_effect
 from armlab.diagnosis.torque.predict.parts import removal_of
 from armlab.diagnosis.torque.search.fitted_model import FittedModel
 from armlab.diagnosis.torque.search.search import Search, Step
+from armlab.effects.contract import UNKNOWN
+from armlab.effects.library import effect_named
 
 
 def claim_expected_parts(belief: Belief) -> Belief:
     """The belief with friction and offsets of joints that claim none, where leaving them out costs much held out.
 
     All friction of a joint is tested at once, without a correction for what else was looked at; it is missed by more
-    than a minor change instead. Friction of which that is so is there, whatever its law: a law whose numbers cannot be
-    believed stands for it without its own name.
+    than a minor change instead. Where the simulation says nothing of it, it is no discovery: that stretches of time
+    share its gain on held-out data is enough, however unsure its numbers are, and the laws of friction of its joint
+    share the probability. Where the numbers of its law cannot be believed, it is friction by no formula.
     """
     found, model = dict(_that_matter(belief)), belief.model
-    wide = _holding(model, found)
-    doubts = doubtful_names(wide, found)
-    found = {group: each for group, each in found.items() if group not in doubts or model.candidate(group).is_friction}
+    doubts, unsaid = doubtful_names(_holding(model, found), found), _joints_unsaid(model)
+    expected = {
+        group for group in found if model.candidate(group).is_friction and model.candidate(group).joint in unsaid
+    }
+    found = {group: each for group, each in found.items() if group not in doubts or group in expected}
     if not found:
         return belief
+    wide = _holding(model, found)
     candidates = {group: model.candidate(group) for group in found}
     steps = [
         Step(f"+ {each.effect} {each.joint}, which predicts", found[group].score) for group, each in candidates.items()
     ]
     effects, weighed = {**belief.effects, **found}, dict(belief.weighed)
-    for group in set(doubts) & set(found):
-        names, own = weigh_effect(wide, group, effects, belief.left), candidates[group]
-        weighed[group] = tuple(each for each in names if (each.effect, each.joint) != (own.effect, own.joint))
-    present = {group: each for group, each in belief.present.items() if group not in found}
-    held = belief.with_state(_holding(model, found).state, *steps)
-    return replace(held, effects=effects, weighed=weighed, present=present)
+    for group in sorted(expected):
+        names, joint = weigh_effect(wide, group, effects, belief.left), candidates[group].joint
+        weighed[group] = tuple(each for each in names if _may_be(each, joint, by_formula=group not in doubts))
+    present = {group: each for group, each in belief.present.items() if group in set(wide.state.groups) - set(found)}
+    return replace(belief.with_state(wide.state, *steps), effects=effects, weighed=weighed, present=present)
+
+
+def _may_be(name: WeighedName, joint: int | None, *, by_formula: bool) -> bool:
+    """Whether a name may be that of friction of a joint: of none of the laws, or of one where a formula is believed."""
+    if name.effect == UNKNOWN.id:
+        return True
+    return by_formula and name.joint == joint and _has_cause(name.effect, dissipates=True)
+
+
+def _has_cause(effect: str, dissipates: bool) -> bool:
+    """Whether an effect is friction where it dissipates: play with friction is not."""
+    return not dissipates or effect_named(effect).cause == "friction"
 
 
 def _holding(model: FittedModel, groups: Collection[int]) -> FittedModel:
-    return replace(model, state=State(tuple(sorted({*model.state.groups, *groups})), model.state.widths))
+    search, state = Search(model.solver, model.design.settings, True, 0), model.state
+    for group in groups:
+        state = search.in_place(state, group)
+    return replace(model, state=state)
+
+
+def _joints_unsaid(model: FittedModel) -> frozenset[int]:
+    """Joints, from 1, of whose friction nothing is said; torque that was simulated elsewhere may hold it."""
+    simulation = model.design.simulation
+    return frozenset() if simulation.kind == "simulated" else simulation.joints_without_friction
 
 
 def _that_matter(belief: Belief) -> Iterator[tuple[int, Evidence]]:
-    """The likeliest law of each kind at a joint that claims none, and the evidence for all of its kind there.
-
-    The law is usual, or present there without a claim.
-    """
+    """The likeliest law of each kind at a joint that claims none, of those that predict, and the evidence for all."""
     assert belief.prediction is not None
     model, settings, predicting = belief.model, belief.model.design.settings, belief.prediction.model
-    judge = Judge(predicting, predicting.state)
-    search = Search(model.solver, settings, True, 0)
+    judge, unsaid = Judge(predicting, predicting.state), _joints_unsaid(model)
     for joint in range(1, model.columns.joints + 1):
         for dissipates in (True, False):
             if any(_is_alike(model, each, joint, dissipates) for each in belief.effects):
@@ -65,17 +88,14 @@ def _that_matter(belief: Belief) -> Iterator[tuple[int, Evidence]]:
             laws = {
                 place: group
                 for group, place in belief.prediction.places.items()
-                if _is_alike(model, group, joint, dissipates)
-                and (
-                    group in belief.present
-                    or (model.candidate(group).facts.usual and not search.excluded(model.state, group))
-                )
+                if _is_alike(model, group, joint, dissipates) and _has_cause(model.candidate(group).effect, dissipates)
             }
             alike = [each for each in predicting.state.groups if _is_alike(predicting, each, joint, dissipates)]
             if not laws or not alike:
                 continue
             evidence = replace(judge.jointly(alike), usual=True)
-            if not removal_of(predicting, alike).is_minor and first_failed_test(evidence, settings) is None:
+            tested = replace(evidence, corrected=evidence.held_p) if joint in unsaid else evidence
+            if not removal_of(predicting, alike).is_minor and first_failed_test(tested, settings) is None:
                 yield laws[_likeliest(predicting, alike, tuple(laws))], evidence
 
 
