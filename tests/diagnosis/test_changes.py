@@ -426,6 +426,15 @@ def test_a_change_is_told_in_percent_only_where_that_is_well_known() -> None:
     assert _amount(_change(0.1, -2e-5, None), short=True) == "first moment x from 0.1 to 0 kg m"
 
 
+@pytest.mark.parametrize(
+    ("seconds", "told"), [(0.02, "20 (10 to 30) ms later"), (-0.02, "20 (10 to 30) ms earlier"), (0.005, "seconds")]
+)
+def test_a_shift_in_time_is_told_as_later_or_earlier(seconds: float, told: str) -> None:
+    interval = (seconds - 0.01, seconds + 0.01)
+    shift = Change("time_delay", None, (), "seconds", None, seconds, interval, None, "s", 1e-6, 0.01, True)
+    assert _amount(shift).startswith(told)
+
+
 @pytest.mark.parametrize("scale", [0.5, 0.9, 2.0])
 def test_torque_that_is_read_by_another_scale_has_that_gain_and_nothing_else(scale: float) -> None:
     old = recording("cold", 0)

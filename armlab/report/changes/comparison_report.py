@@ -46,6 +46,7 @@ from armlab.diagnosis.settings import Baseline
 from armlab.diagnosis.torque.names.findings import FRICTION
 from armlab.diagnosis.tuning import ComparisonTuning
 from armlab.effects.library import effect_named
+from armlab.effects.timing import TIME_DELAY_FACTS
 from armlab.effects.words import at_place, place_in_words
 from armlab.recordings.identifiable import require_identifiable, require_possible
 from armlab.recordings.load import load_recording
@@ -134,6 +135,8 @@ def _names_phrase(arm: Arm, named: NamedChange) -> str:
 
 def _amount(change: Change, short: bool = False) -> str:
     """A change of a number: in percent where that is well known, else in units. short: not beside both levels."""
+    if change.effect == TIME_DELAY_FACTS.id and change.interval[0] * change.interval[1] > 0:
+        return _shift(change)
     unit, scale = format_unit(change.unit), 1.0
     if change.unit == "m" and abs(change.difference) < MAX_LENGTH_IN_MM:
         unit, scale = "mm", 1e3
@@ -149,6 +152,14 @@ def _amount(change: Change, short: bool = False) -> str:
     if change.ratio is not None:
         return f"{name} {_percents(change.ratio)}"
     return f"{name} changes by {difference}"
+
+
+def _shift(change: Change) -> str:
+    """By how much torque is recorded later, or earlier, than it was."""
+    size, *ends = (abs(1e3 * value) for value in (change.difference, *change.interval))
+    low, high = sorted(ends)
+    when = "later" if change.difference > 0 else "earlier"
+    return f"{format_number(size)} ({format_number(low)} to {format_number(high)}) ms {when}"
 
 
 def _level(value: float, first: float) -> str:
