@@ -14,6 +14,7 @@ from armlab.diagnosis.torque.columns.solver import State
 from armlab.diagnosis.torque.evidence.evidence import Evidence, Judge
 from armlab.diagnosis.torque.evidence.plausibility import doubtful_names
 from armlab.diagnosis.torque.evidence.pruning import first_failed_test
+from armlab.diagnosis.torque.names.findings import FRICTION
 from armlab.diagnosis.torque.names.weighing import weigh_effect
 from armlab.diagnosis.torque.predict.parts import removal_of
 from armlab.diagnosis.torque.search.fitted_model import FittedModel
@@ -55,12 +56,12 @@ def _may_be(name: WeighedName, joint: int | None, *, by_formula: bool) -> bool:
     """Whether a name may be that of friction of a joint: of none of the laws, or of one where a formula is believed."""
     if name.effect == UNKNOWN.id:
         return True
-    return by_formula and name.joint == joint and _has_cause(name.effect, dissipates=True)
+    return by_formula and name.joint == joint and _is_told_as_friction(name.effect)
 
 
-def _has_cause(effect: str, dissipates: bool) -> bool:
-    """Whether an effect is friction where it dissipates: play with friction is not."""
-    return not dissipates or effect_named(effect).cause == "friction"
+def _is_told_as_friction(effect: str) -> bool:
+    """Whether the cause of an effect is friction: that of play with friction is play."""
+    return effect_named(effect).cause == FRICTION
 
 
 def _holding(model: FittedModel, groups: Collection[int]) -> FittedModel:
@@ -88,7 +89,8 @@ def _that_matter(belief: Belief) -> Iterator[tuple[int, Evidence]]:
             laws = {
                 place: group
                 for group, place in belief.prediction.places.items()
-                if _is_alike(model, group, joint, dissipates) and _has_cause(model.candidate(group).effect, dissipates)
+                if _is_alike(model, group, joint, dissipates)
+                and (not dissipates or _is_told_as_friction(model.candidate(group).effect))
             }
             alike = [each for each in predicting.state.groups if _is_alike(predicting, each, joint, dissipates)]
             if not laws or not alike:
