@@ -247,7 +247,8 @@ class Diagnosis:
     as it is. setup: how it is to be read, None where that was not asked; `recording` is then as it should be read.
     weighed: the names of each finding, and of what was not probable enough for one. reason: why no model was fitted,
     empty where one was. unnamed: the joint that is predicted much better without any finding. left: share of the torque
-    of each role that the model leaves behind the low-pass of plain least squares, geometric mean over the joints.
+    of each role that the model leaves behind the low-pass of plain least squares, geometric mean over the joints;
+    carries_over: whether it explains what was held out, too.
     """
 
     recording: Recording
@@ -280,4 +281,5 @@ class Diagnosis:
     weighed: tuple[Weighed, ...] = ()
     unnamed: JointFit | None = None
     left: Mapping[Role, float] = field(default_factory=dict)
+    carries_over: bool = True
     settings: dict[str, float | str | bool] = field(default_factory=dict)

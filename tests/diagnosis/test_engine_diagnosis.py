@@ -13,8 +13,10 @@ from shipped_schemas import check_against_schema
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.result import Diagnosis
-from armlab.diagnosis.torque.diagnose import diagnose
+from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.torque.diagnose import _only_if_explained, diagnose
 from armlab.identification.identifier import Identifier
+from armlab.recordings.recording import Role
 from armlab.report.account.summary import summary_of
 from armlab.report.verdict_files import make_verdict, write_verdict
 from problem.motion import Motion
@@ -192,6 +194,18 @@ def test_torque_in_another_unit_is_read_rightly_and_the_factor_told() -> None:
     found = diagnose(scaled)
     assert "the torque of all joints is 1000 times the true one: another unit" in summary_of(found)
     assert {each.joint for each in found.claims if each.effect == "viscous_friction"} == {1, 2, 3}
+
+
+@pytest.mark.parametrize(("fitted", "status"), [(0.1, "mismatch"), (0.9, "inconclusive")])
+def test_physics_that_does_not_carry_over_is_told_and_what_nothing_explains_is_not(
+    viscous_found: Diagnosis, fitted: float, status: str
+) -> None:
+    left: dict[Role, float] = {"identify": fitted, "validate": 0.9}
+    found = _only_if_explained(replace(viscous_found, left=left), None, Settings().tuning.reading)
+    assert found.status == status
+    told = summary_of(found).replace("\N{NO-BREAK SPACE}", " ")
+    assert ("10 % of the torque that it was fitted to, and 90 % of what was held out" in told) == (fitted < 0.5)
+    assert "viscous friction" in told or fitted > 0.5
 
 
 def test_an_arm_that_never_moves_is_inconclusive() -> None:

@@ -71,12 +71,17 @@ def diagnose(
 
 
 def _only_if_explained(found: Diagnosis, setup: Answer | None, tuning: ReadingTuning) -> Diagnosis:
-    """The diagnosis, or an inconclusive one where neither a reading nor physics explains the torque."""
+    """The diagnosis, or an inconclusive one where neither a reading nor physics explains the torque.
+
+    What is found stands where the model explains the torque that it was fitted to, and not what was held out.
+    """
     if not found.left or found.simulation.kind == "simulated":
         return found
     fitted, share = (found.left[role] for role in ROLES)
     if share <= tuning.max_unexplained:
         return found
+    if fitted <= tuning.max_unexplained and any(not each.minor for each in found.claims):
+        return replace(found, carries_over=False)
     tried = f", however it is read ({setup.looks} readings were tried)" if setup is not None and setup.looks > 1 else ""
     reason = (
         f"Links, friction and all other physics leave {share:.0%} of the recorded torque{tried}: another robot, or "

@@ -13,6 +13,7 @@ from armlab.effects.library import effect_named
 from armlab.effects.links import PAYLOAD_FACTS
 from armlab.effects.words import place_in_words
 from armlab.identification.torque_model import TorqueModel
+from armlab.recordings.recording import ROLES
 from armlab.report.account.account import Account, StatedFinding, account_of
 from armlab.report.torque.sentences import claim_figures, model_in_words
 from armlab.report.words import (
@@ -156,7 +157,16 @@ class _Writer:
             yield f"{name} {'of' if cause.cause == LINKS else 'at'} {place}: {numbers}"
 
     def _gain(self) -> str:
-        """How far the held-out error falls where it falls most, and what that leaves of the torque."""
+        """How far the held-out error falls where it falls most, and what that leaves of the torque.
+
+        Of a model that does not carry over, what it leaves of both, and what to do.
+        """
+        if not self.diagnosis.carries_over:
+            fitted, held_out = (format_percent(self.diagnosis.left[role]) for role in ROLES)
+            return (
+                f"The model leaves {fitted} of the torque that it was fitted to, and {held_out} of what was held out: "
+                "record longer runs in which all joints move."
+            )
         fit, before = self._largest_fall()
         arm, unit = self.diagnosis.simulation.arm, joint_unit(self.diagnosis.simulation.arm, fit.joint - 1)
         left = next((each for each in self.account.left if each.joint == fit.joint), None)
