@@ -9,14 +9,17 @@ import pytest
 from armlab.common.arrays import Array
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.belief import Belief
+from armlab.diagnosis.torque.columns.design import DesignMatrix
 from armlab.diagnosis.torque.columns.solver import State
 from armlab.diagnosis.torque.diagnose import prepare
 from armlab.diagnosis.torque.evidence.evidence import Judge
+from armlab.diagnosis.torque.evidence.plausibility import unclaim_implausible
 from armlab.diagnosis.torque.names import expected_parts
 from armlab.diagnosis.torque.names.expected_parts import claim_expected_parts
 from armlab.diagnosis.torque.predict.prediction import fit_prediction
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_background
 from armlab.diagnosis.torque.search.search import FailedTest
+from armlab.diagnosis.torque.stages import find_names
 from armlab.effects.library import effect_named, library
 from problem.motion import Motion
 
@@ -84,3 +87,30 @@ def test_friction_that_predictions_need_is_friction_of_its_joint_by_whatever_law
     laws = [each for each in names if each.effect != "unknown"]
     assert {each.joint for each in laws} == {2}
     assert {effect_named(each.effect).cause for each in laws} == {"friction"}
+
+
+def test_friction_stays_in_the_model_though_no_claim_holds_it() -> None:
+    design = prepare(cases.recording(friction_of_joint_2), None, Settings(), lambda message: None)
+    assert isinstance(design, DesignMatrix)
+    belief = find_names(design, 0, lambda message: None)
+    solver = belief.model.solver
+    laws = {(solver.candidate(each).effect, solver.candidate(each).joint) for each in solver.expected}
+    assert laws == {(law, joint) for law in ("coulomb_friction", "viscous_friction") for joint in (1, 2, 3)}
+    assert {solver.candidate(each).joint for each in belief.effects} == {2}
+    assert belief.present
+    assert set(belief.present) <= solver.expected & set(belief.model.state.groups)
+    log = [each.what for each in unclaim_implausible(belief).model.steps]
+    for law in map(solver.candidate, belief.present):
+        assert any(each.startswith(f"present, not claimed: {law.effect} {law.joint}") for each in log)
+
+
+def test_usual_friction_leaves_where_another_law_of_friction_stands(nothing_named: FittedModel) -> None:
+    solver = nothing_named.solver
+    usual = group_at_joint_2(nothing_named, "coulomb_friction")
+    special = group_at_joint_2(nothing_named, "load_dependent_friction")
+    elsewhere = group_at_joint_2(nothing_named, "torque_gain_error")
+    state = State((), nothing_named.state.widths).plus(usual)
+    assert solver.is_held(state, usual)
+    assert solver.is_held(state.plus(elsewhere), usual)
+    assert not solver.is_held(state.plus(special), usual)
+    assert not solver.is_held(state.plus(elsewhere), elsewhere)

@@ -12,6 +12,7 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.formats import VerdictFile
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Guards, Settings
+from armlab.diagnosis.torque.columns.columns import Group
 from armlab.diagnosis.torque.diagnose import diagnose, prepare
 from armlab.diagnosis.torque.predict.found_model import model_found, named_model
 from armlab.diagnosis.torque.predict.prediction import (
@@ -116,12 +117,29 @@ def test_a_law_of_unknown_size_is_held_to_the_torque_of_its_joint() -> None:
     model = first_model(cases.recording(friction_and_trifle))
     torque = np.sqrt(np.mean(model.design.observed.torque**2, axis=0))
     moments, held = model.design.solver(model.noise, as_large_as_torque=True)
-    offsets = [each for each in held.groups if each.candidate.effect == "torque_offset"]
-    assert len(offsets) == 3
-    for group in offsets:
+    levels = [(each, block) for each, block in zip(held.groups, model.design.blocks, strict=True) if is_coulomb(each)]
+    assert len(levels) == 3
+    for group, block in levels:
         (column,), joint = group.columns, group.candidate.rows[0]
         prior = held.precisions[column] - model.solver.precisions[column]
-        assert prior == pytest.approx((torque[joint] * moments.lengths[column]) ** -2, rel=1e-6)
+        scale = torque[joint] / np.sqrt(np.mean(block.values**2))
+        assert prior == pytest.approx((scale * moments.lengths[column]) ** -2, rel=1e-6)
+
+
+def is_coulomb(group: Group) -> bool:
+    return group.candidate.effect == "coulomb_friction"
+
+
+def test_an_offset_is_thought_to_be_as_large_as_beside_the_friction_of_real_joints() -> None:
+    model = first_model(cases.recording(friction_and_trifle))
+    friction = friction_and_trifle(model.design.scenes[0].motion, np.empty(0))
+    moments, solver = model.moments, model.solver
+    for group in (each for each in solver.groups if each.candidate.effect == "torque_offset"):
+        (column,), joint = group.columns, group.candidate.rows[0]
+        torque = np.sqrt(np.mean(model.design.observed.torque[:, joint] ** 2))
+        scale = np.hypot(0.3 * np.sqrt(np.mean(friction[:, joint] ** 2)), 0.01 * torque)
+        prior = (solver.precisions[column] - solver.tuning.ridge) ** -0.5 / moments.lengths[column]
+        assert prior == pytest.approx(scale, rel=0.1)
 
 
 def test_positions_are_smoothed_as_predicts_best(found: Diagnosis) -> None:

@@ -14,7 +14,6 @@ from armlab.diagnosis.torque.columns.design import DesignMatrix
 from armlab.diagnosis.torque.diagnose import prepare
 from armlab.diagnosis.torque.evidence.pruning import prune, scan_what_is_left
 from armlab.diagnosis.torque.search.fitted_model import (
-    FittedModel,
     fit_background,
     search_effects,
     torque_of,
@@ -48,17 +47,17 @@ def passed_without_scans(hidden: cases.Hidden) -> Belief:
     return replace(passed, model=replace(passed.model, design=replace(passed.model.design, families=tuple(offered))))
 
 
-def named(model: FittedModel) -> set[tuple[str, int | None]]:
-    groups = (model.candidate(each) for each in model.state.groups)
+def named(belief: Belief) -> set[tuple[str, int | None]]:
+    groups = (belief.model.candidate(each) for each in belief.effects)
     return {(each.effect, each.joint) for each in groups}
 
 
 def test_a_second_scan_finds_what_the_first_one_did_not_and_keeps_the_rest() -> None:
     passed = passed_without_scans(viscous_and_ripple)
-    assert ("torque_ripple", 2) not in named(passed.model)
+    assert ("torque_ripple", 2) not in named(passed)
     scanned = scan_what_is_left(passed)
     model = scanned.model
-    assert named(model) == {("viscous_friction", 2), ("torque_ripple", 2)}
+    assert named(scanned) == {("viscous_friction", 2), ("torque_ripple", 2)}
     (ripple,) = (group for group in scanned.effects if model.candidate(group).effect == "torque_ripple")
     assert model.candidate(ripple).shape[0] == pytest.approx(24.0, abs=0.2)
     assert model.noise is passed.model.noise
@@ -76,5 +75,5 @@ def test_a_second_scan_looks_with_the_links_and_the_torque_that_passed() -> None
 
 def test_a_second_scan_that_finds_nothing_changes_nothing() -> None:
     passed = passed_without_scans(viscous)
-    assert named(passed.model) == {("viscous_friction", 2)}
+    assert named(passed) == {("viscous_friction", 2)}
     assert scan_what_is_left(passed) is passed

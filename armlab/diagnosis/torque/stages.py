@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.columns.design import DesignMatrix
+from armlab.diagnosis.torque.columns.solver import State
 from armlab.diagnosis.torque.evidence.added_body import possible_links, with_possible_bodies
 from armlab.diagnosis.torque.evidence.friction_curves import name_friction_curves
 from armlab.diagnosis.torque.evidence.plausibility import unclaim_implausible
@@ -38,8 +39,10 @@ class Stage:
 
 
 def choose_prediction(belief: Belief) -> Belief:
-    """The belief with the model that predicts, whose bodies can exist."""
-    return replace(belief, prediction=with_possible_bodies(fit_prediction(belief.model)))
+    """The belief with the model that predicts, whose bodies can exist. What no claim holds has to help there."""
+    model, claimed = belief.model, (each for each in belief.model.state.groups if each not in belief.present)
+    named = replace(model, state=State(tuple(claimed), model.state.widths))
+    return replace(belief, prediction=with_possible_bodies(fit_prediction(named)))
 
 
 BY_TESTS = (

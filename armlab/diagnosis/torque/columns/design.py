@@ -38,7 +38,8 @@ class DesignMatrix:
     """rigid: filtered columns of the base parameters by joint. target: measured less simulated torque,
     filtered, (rows, joints). scenes: one a run, for the present model; calm: the same with the calm motion, for
     candidates that follow the model. blocks: the candidates' filtered columns. families: those that offered them.
-    features, banks: of each joint, for surrogates: many of everything, and few of one kind each.
+    features, banks: of each joint, for surrogates: many of everything, and few of one kind each. offsets: how large
+    those of each joint are thought to be before the data, (joints,), N m (N); None before a first fit.
     """
 
     settings: Settings
@@ -54,6 +55,7 @@ class DesignMatrix:
     families: tuple[Family, ...] = ()
     features: tuple[FoldedFeatures, ...] = ()
     banks: tuple[tuple[Features, ...], ...] = ()
+    offsets: Array | None = None
 
     @property
     def places(self) -> int:
@@ -73,13 +75,27 @@ class DesignMatrix:
         its offset.
         """
         found, groups = compute_moments(self.columns, noise, self.observed), self.columns.groups
-        scales = [group.candidate.prior_scale(self.simulation.inertial) for group in groups]
+        scales = [self._known_scale(group.candidate) for group in groups]
         if as_large_as_torque:
             pairs = zip(scales, self.blocks, strict=True)
             scales = [known if np.isfinite(known) else self._torque_scale(block) for known, block in pairs]
         simulated = [self.simulation.coefficients_of(group.candidate) for group in groups]
-        tuning = self.settings.tuning.solver
-        return found, Solver(found, groups, len(self.base), self.prior, self.places, scales, simulated, tuning)
+        tuning, unsaid = self.settings.tuning.solver, self.simulation.joints_unsaid
+        expected = frozenset(
+            number
+            for number, group in enumerate(groups)
+            if group.candidate.facts.usual and group.candidate.is_friction and group.candidate.joint in unsaid
+        )
+        return found, Solver(
+            found, groups, len(self.base), self.prior, self.places, scales, simulated, expected, tuning
+        )
+
+    def _known_scale(self, candidate: Candidate) -> float:
+        """Standard deviation of a law's coefficients before the data; infinite where nothing is known."""
+        facts, joint = candidate.facts, candidate.joint
+        if self.offsets is None or not facts.usual or facts.dissipates or joint not in self.simulation.joints_unsaid:
+            return candidate.prior_scale(self.simulation.inertial)
+        return float(self.offsets[joint - 1])
 
     def _torque_scale(self, block: Block) -> float:
         """The coefficient with which a law makes as much torque as its joints have; infinite where it makes none."""

@@ -77,6 +77,7 @@ class Solver:
 
     places: number of places that are looked at, the factor of the correction. scales: of each group's coefficients.
     simulated: the coefficients that the simulation has of each group's law already, to which what is fitted adds.
+    expected: numbers of usual friction of joints of whose friction the simulation says nothing.
     flexible_gains: what surrogates explain of states at joints, kept for who asks again (`flexible_gain`).
     """
 
@@ -89,10 +90,11 @@ class Solver:
         places: int,
         scales: Sequence[float],
         simulated: Sequence[Array],
+        expected: frozenset[int],
         tuning: SolverTuning,
     ) -> None:
         self.moments, self.groups, self.base, self.prior, self.places = moments, groups, base, prior, places
-        self.simulated, self.tuning = simulated, tuning
+        self.simulated, self.expected, self.tuning = simulated, expected, tuning
         self.precisions = self._precisions(scales)
         self._links: dict[Widths | None, LinkColumns] = {}
         self._fits: dict[State, Fit] = {}  # those that were asked for last
@@ -154,6 +156,12 @@ class Solver:
             for effect in candidate.replaces:
                 out[number, numbers.get((effect, candidate.joint), [])] = True
         return out
+
+    def is_held(self, state: State, group: int) -> bool:
+        """Whether a state keeps a group: usual friction of a joint at which no other law of friction stands."""
+        others = (self.candidate(each) for each in state.groups if self.unusual[each])
+        joint = self.candidate(group).joint
+        return group in self.expected and not any(each.is_friction and each.joint == joint for each in others)
 
     def contained(self, number: int) -> tuple[int, ...]:
         """Numbers of the simpler effects that a group contains and has to be better than."""

@@ -281,7 +281,7 @@ def hold_body(model: FittedModel) -> FittedModel:
     point = len(present) == 1 and len(groups[present[0]].columns) == 1 and not held & set(present)
     if not any(widths) and (point or not present):
         return model
-    trials = _trials(model, present)
+    trials = [each for each in _trials(model, present) if not _is_one_link(model, each)]
     if all(_is_possible(model, group) for group in present):
         trials = [each for each in trials if _stands_in(model, each)]
     best = max(trials, key=lambda each: each.score, default=None)
@@ -338,6 +338,16 @@ def _fewer_off(widths: Widths | None) -> list[Widths | None]:
     off = [link for link, width in enumerate(widths or ()) if width]
     fewer = [tuple(0.0 if other == link else each for other, each in enumerate(widths or ())) for link in off]
     return list(dict.fromkeys([*fewer, (0.0,) * len(widths or ())])) if off else []
+
+
+def _is_one_link(model: FittedModel, trial: BodyTrial) -> bool:
+    """Whether one link that is off, and is no body, is likelier than a body beside links that are off."""
+    solver, widths = model.solver, trial.without.widths or ()
+    if not any(widths):
+        return False
+    alone = State(trial.without.groups, (0.0,) * len(widths))
+    likeliest = max(solver.fit(alone.plus(group)).score for group in body_groups(solver).values())
+    return likeliest - trial.score > model.design.settings.tuning.claims.max_deficit
 
 
 def _stands_in(model: FittedModel, trial: BodyTrial) -> bool:

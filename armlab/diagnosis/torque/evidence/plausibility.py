@@ -15,6 +15,7 @@ from armlab.diagnosis.result import Claim
 from armlab.diagnosis.torque.belief import Belief
 from armlab.diagnosis.torque.evidence.added_body import mass_found_anew
 from armlab.diagnosis.torque.evidence.evidence import Evidence
+from armlab.diagnosis.torque.evidence.pruning import first_failed_test
 from armlab.diagnosis.torque.evidence.unknown import remaining
 from armlab.diagnosis.torque.names.intervals import extend_with_shapes
 from armlab.diagnosis.torque.rows.data import Observed
@@ -36,10 +37,13 @@ def unclaim_implausible(belief: Belief) -> Belief:
     A shift in time below one sampling interval is told by a model alone that leaves nothing structured: beside what is
     unknown it is how the log was made.
     """
-    doubts = doubtful_names(belief.model, belief.effects, exact=not remaining(belief))
-    steps = [Step.against(belief.model.candidate(group), test, NOT_CLAIMED) for group, test in doubts.items()]
+    model, settings = belief.model, belief.model.design.settings
+    doubts = doubtful_names(model, belief.effects, exact=not remaining(belief))
+    held = {group: each for group, each in belief.present.items() if group in model.state.groups}
+    failed = {group: test for group, each in held.items() if (test := first_failed_test(each, settings)) is not None}
+    steps = [Step.against(model.candidate(group), test, NOT_CLAIMED) for group, test in (failed | doubts).items()]
     kept = {group: each for group, each in belief.effects.items() if group not in doubts}
-    present = {group: belief.effects[group] for group in doubts}
+    present = held | {group: belief.effects[group] for group in doubts}
     return replace(belief.with_steps(*steps), effects=kept, present=present)
 
 

@@ -176,12 +176,17 @@ def _remove_failing(belief: Belief) -> Belief:
         groups, state = model.solver.groups, model.state
         judge = Judge(model, state)
         effects = judge.effects()
-        bad = {group: why for group, each in effects.items() if (why := first_failed_test(each, settings)) is not None}
+        failed = {
+            group: why for group, each in effects.items() if (why := first_failed_test(each, settings)) is not None
+        }
+        held = [group for group in failed if model.solver.is_held(state, group) and effects[group].objection is None]
+        bad = {group: why for group, why in failed.items() if group not in held}
         if not bad:
-            held = find_body_anew(model)
-            if held is model or found_anew >= settings.tuning.pruning.max_cycles:
-                return replace(belief, model=model, effects=effects, banned=banned)
-            model, found_anew = held, found_anew + 1
+            anew = find_body_anew(model)
+            if anew is model or found_anew >= settings.tuning.pruning.max_cycles:
+                present = {group: effects.pop(group) for group in held}
+                return replace(belief, model=model, effects=effects, present=present, banned=banned)
+            model, found_anew = anew, found_anew + 1
             continue
         weakest = min(bad, key=lambda group: (not judge.simpler(group), effects[group].score))
         gone = _groups_to_remove(judge, weakest)

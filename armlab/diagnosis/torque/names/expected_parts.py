@@ -32,7 +32,7 @@ def claim_expected_parts(belief: Belief) -> Belief:
     share the probability. Where the numbers of its law cannot be believed, it is friction by no formula.
     """
     found, model = dict(_that_matter(belief)), belief.model
-    doubts, unsaid = doubtful_names(_holding(model, found), found), _joints_unsaid(model)
+    doubts, unsaid = doubtful_names(_holding(model, found), found), model.design.simulation.joints_unsaid
     expected = {
         group for group in found if model.candidate(group).is_friction and model.candidate(group).joint in unsaid
     }
@@ -71,17 +71,11 @@ def _holding(model: FittedModel, groups: Collection[int]) -> FittedModel:
     return replace(model, state=state)
 
 
-def _joints_unsaid(model: FittedModel) -> frozenset[int]:
-    """Joints, from 1, of whose friction nothing is said; torque that was simulated elsewhere may hold it."""
-    simulation = model.design.simulation
-    return frozenset() if simulation.kind == "simulated" else simulation.joints_without_friction
-
-
 def _that_matter(belief: Belief) -> Iterator[tuple[int, Evidence]]:
     """The likeliest law of each kind at a joint that claims none, of those that predict, and the evidence for all."""
     assert belief.prediction is not None
     model, settings, predicting = belief.model, belief.model.design.settings, belief.prediction.model
-    judge, unsaid = Judge(predicting, predicting.state), _joints_unsaid(model)
+    judge, unsaid = Judge(predicting, predicting.state), model.design.simulation.joints_unsaid
     for joint in range(1, model.columns.joints + 1):
         for dissipates in (True, False):
             if any(_is_alike(model, each, joint, dissipates) for each in belief.effects):

@@ -158,7 +158,7 @@ def _design_at(
     runs = [each.run for each in design.observed.signals]
     observed = observe(runs, design.simulation.arm, design.simulation.inertial, settings)
     fresh = build_design_matrix(observed, design.simulation, design.base, design.prior, settings)
-    moved = follow_model(fresh, model)
+    moved = follow_model(replace(fresh, offsets=design.offsets), model)
     return replace(moved, blocks=tuple(moved.block(each, 0) for each in candidates))
 
 

@@ -45,6 +45,11 @@ class Simulation:
         known = {each.joints[0] for each in parts if each.is_friction}
         return frozenset(range(1, len(self.arm) + 1)) - known
 
+    @property
+    def joints_unsaid(self) -> frozenset[int]:
+        """Joints, from 1, of whose friction nothing is said; torque that was simulated elsewhere may hold it."""
+        return frozenset() if self.kind == "simulated" else self.joints_without_friction
+
     def coefficients_of(self, candidate: Candidate) -> Array:
         """Coefficients of a law as the simulation has it already at its place, zeros where it has none.
 

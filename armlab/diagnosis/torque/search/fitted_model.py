@@ -21,6 +21,9 @@ from armlab.effects.contract import Candidate, Family, Scene
 from armlab.effects.model import FittedEffect, torque_in_mechanism
 from problem.regressor import rigid_body_torque
 
+OFFSET_SHARE = 0.3  # of the friction of a joint: offsets are 5 to 30 % of it (tables of TX40, UR10 and EMPS)
+ZERO_SHARE = 0.01  # of the torque of a joint, which is read with a zero that is so much off (chosen by eye)
+SMALLEST_OFFSET = 1e-9  # N m (N): less is none
 Progress = Callable[[str], None]
 
 
@@ -100,7 +103,8 @@ def fit_background(design: DesignMatrix, families: Sequence[Family], seed: int, 
     flexible = [flexible_features(observed, joint, rng, tuning) for joint in joints]
     made = tuple(fold_features(each, observed, joint, tuning) for joint, each in enumerate(flexible))
     banks = motion_banks(observed, tuning)
-    whole = replace(moved.with_candidates(families, _split_by_run(moved, left)), features=made, banks=banks)
+    offered = moved.with_candidates(families, _split_by_run(moved, left))
+    whole = replace(offered, features=made, banks=banks, offsets=_offset_scales(first))
     rough = _fit_model(
         whole, _white_noise(left, whole), lambda solver: background_state(solver, initial_link_widths(whole))
     )
@@ -108,6 +112,21 @@ def fit_background(design: DesignMatrix, families: Sequence[Family], seed: int, 
     forward = Search(rough.solver, replace(design.settings, guards=guards), True, 0)
     steps: list[Step] = []
     return replace(rough, state=forward.climb(rough.state, steps))
+
+
+def _offset_scales(model: FittedModel) -> Array:
+    """How large offsets are thought to be: as those of real arms beside the friction of a model, (joints,), N m (N).
+
+    One that is far larger stands for gravity, or for a spring, that the motion does not separate from it. Where a joint
+    has no friction, its torque has a zero that is a little off.
+    """
+    own, coefficients = np.zeros(model.columns.size), model.coefficients(model.fit)
+    for group in (model.solver.groups[each] for each in model.state.groups):
+        if group.candidate.is_friction:
+            own[group.columns] = coefficients[group.columns]
+    friction, torque = model.columns.torque_of(own), model.design.observed.torque
+    squares = OFFSET_SHARE**2 * np.mean(friction**2, axis=0) + ZERO_SHARE**2 * np.mean(torque**2, axis=0)
+    return np.asarray(np.sqrt(np.maximum(squares, SMALLEST_OFFSET**2)))
 
 
 def scan_residual(model: FittedModel) -> DesignMatrix:
@@ -170,11 +189,12 @@ def _search_state(
     at_rest = None if opened is None else (0.0,) * links
     base = _fit_model(design, noise, State((), at_rest))
     starts = [] if known is None else [known]
+    search = Search(base.solver, settings, opened is None, links)
     if afresh:
-        starts.append(State((), at_rest))
+        starts.append(search.with_expected(State((), at_rest)))
     if afresh and settings.guards.background_start:
         starts.append(background_state(base.solver, opened))
-    state, moves = Search(base.solver, settings, opened is None, links).best(starts)
+    state, moves = search.best(starts)
     return replace(base, state=state, steps=(*steps, *moves))
 
 

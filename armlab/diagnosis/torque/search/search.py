@@ -142,6 +142,17 @@ class Search:
             state = state.minus(other)
         return state.plus(group)
 
+    def with_expected(self, state: State) -> State:
+        """The state with usual friction where it is expected, nothing holds its place, and physics allows it."""
+        missing = [each for each in sorted(self.solver.expected - set(state.groups)) if each not in self.banned]
+        for group in missing:
+            if self.solver.is_held(state, group) and not self.has_no_room(state, group):
+                state = state.plus(group)
+        for group in missing:
+            if group in state.groups and self.objection(state, group) is not None:
+                state = state.minus(group)
+        return state
+
     def _replaced(self, state: State, group: int) -> list[int]:
         return [other for other in state.groups if self.solver.replaces[group, other]]
 
@@ -220,24 +231,27 @@ class Search:
         return self.solver.objection(group, self.solver.values(fit, group), self.solver.covariance(fit, group))
 
     def _backward(self, state: State) -> Iterator[tuple[str, State]]:
-        if not self.settings.guards.backward_elimination or not state.groups:
+        may_leave = [each for each in state.groups if not self.solver.is_held(state, each)]
+        if not self.settings.guards.backward_elimination or not may_leave:
             return
         losses = self.solver.losses(self.solver.fit(state))
-        group = max(losses, key=lambda each: losses[each])
+        group = max(may_leave, key=lambda each: losses[each])
         if losses[group] > 0:
-            yield f"- {self._name(group)}", state.minus(group)
+            yield f"- {self._name(group)}", self.with_expected(state.minus(group))
 
     def _exchanges(self, state: State) -> Iterator[tuple[str, State]]:
         if not self.settings.guards.backward_elimination:
             return
-        places = [(group, without) for group in state.groups for without in self._without(state, group)]
+        may_leave = [each for each in state.groups if not self.solver.is_held(state, each)]
+        places = [(group, without) for group in may_leave for without in self._without(state, group)]
         alone = [(group, without, state, group) for group, without in places if without == state.minus(group)]
         others = [(group, without, without, None) for group, without in places if without != state.minus(group)]
         for group, without, whole, but in (*alone, *others):  # where only the group is gone, all from one fit
             if self._may_raise(state, without, whole, but, group):
                 added = self._addition(without, self.gains(whole, but), group)
                 if added is not None:
-                    yield f"{self._name(group)} -> {self._name(added)}", self.with_group(without, added)
+                    other = self.with_expected(self.with_group(without, added))
+                    yield f"{self._name(group)} -> {self._name(added)}", other
 
     def _may_raise(self, state: State, without: State, whole: State, but: int | None, group: int) -> bool:
         """Whether any group could raise the score of a state enough in the place of one."""
