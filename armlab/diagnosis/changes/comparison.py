@@ -191,7 +191,10 @@ def _look(pooled: Pooled, table_of: Callable[[Pooled], ChangeTable]) -> ChangeLo
 
 
 def _followed(look: ChangeLook, table_of: Callable[[Pooled], ChangeTable]) -> ChangeLook:
-    """The look with columns that follow what is common beside its names, until these stay; if they do not, once."""
+    """The look with columns that follow what is common beside its names, until these stay.
+
+    Where no name is left beside such columns, nothing changed; where other names come and go, the first that followed.
+    """
     looks = [look]
     while looks[-1].sound.named and len(looks) <= FOLLOW_ROUNDS:
         last = looks[-1]
@@ -200,7 +203,7 @@ def _followed(look: ChangeLook, table_of: Callable[[Pooled], ChangeTable]) -> Ch
         looks.append(ChangeLook(pooled, table, find_sound_changes(pooled, table)))
         if looks[-1].groups == last.groups:
             return looks[-1]
-    return looks[min(1, len(looks) - 1)]
+    return looks[min(1, len(looks) - 1)] if looks[-1].sound.named else looks[-1]
 
 
 def conclude(
