@@ -88,7 +88,7 @@ def _is_one_clock(position: Array, time: Array, order: Rows, is_in_order: bool) 
     if is_in_order:
         forward = np.diff(time)
         dense = np.diff(time[order])[~together].mean() < MIN_DENSITY * np.median(forward[forward > 0])
-        return bool(not dense and after <= MAX_USUAL_STEPS * step[together].mean())
+        return bool(not dense and together.any() and after <= MAX_USUAL_STEPS * step[together].mean())
     lag = np.abs(scaled[order][SMOOTH_LAG:] - scaled[order][:-SMOOTH_LAG]).sum(axis=1)
     is_smooth = len(lag) > 0 and lag.mean() >= MIN_SMOOTH_RATIO * step.mean()
     forward = np.diff(time[order])
