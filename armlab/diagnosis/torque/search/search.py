@@ -230,8 +230,11 @@ class Search:
         fit = self.solver.fit(state)
         return self.solver.objection(group, self.solver.values(fit, group), self.solver.covariance(fit, group))
 
+    def _may_leave(self, state: State) -> list[int]:
+        return [each for each in state.groups if not self.solver.is_held(state, each)]
+
     def _backward(self, state: State) -> Iterator[tuple[str, State]]:
-        may_leave = [each for each in state.groups if not self.solver.is_held(state, each)]
+        may_leave = self._may_leave(state)
         if not self.settings.guards.backward_elimination or not may_leave:
             return
         losses = self.solver.losses(self.solver.fit(state))
@@ -242,8 +245,7 @@ class Search:
     def _exchanges(self, state: State) -> Iterator[tuple[str, State]]:
         if not self.settings.guards.backward_elimination:
             return
-        may_leave = [each for each in state.groups if not self.solver.is_held(state, each)]
-        places = [(group, without) for group in may_leave for without in self._without(state, group)]
+        places = [(group, without) for group in self._may_leave(state) for without in self._without(state, group)]
         alone = [(group, without, state, group) for group, without in places if without == state.minus(group)]
         others = [(group, without, without, None) for group, without in places if without != state.minus(group)]
         for group, without, whole, but in (*alone, *others):  # where only the group is gone, all from one fit
