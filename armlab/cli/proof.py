@@ -40,7 +40,8 @@ _PATH = click.Path(path_type=Path)
     "folders",
     multiple=True,
     metavar="NAME",
-    help="A recording with a D-H table below ARMLAB_RECORDINGS for the setup tier, beside the public ones, repeatable.",
+    help="A recording below ARMLAB_RECORDINGS for the tiers setup (with a D-H table) and real, beside the public ones; "
+    "may be given more than once.",
 )
 @click.option("--work", type=_PATH, help="Folder for sets and verdicts [default: .armlab/proof/<commit>].")
 @click.option("--results", type=OutputPath(), help="Folder for scores [default: results/proof].")

@@ -18,7 +18,7 @@ from armlab.common.settings import suggest_name
 from armlab.recordings.imports.ros import read_bag
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording, Role
-from armlab.recordings.recording_file import Draft, DraftRun, Keys, write_recording
+from armlab.recordings.recording_file import FILE_NAME, Draft, DraftRun, Keys, write_recording
 
 GITHUB = "https://raw.githubusercontent.com"
 KUKA = f"{GITHUB}/JonasWeigand/Robot_Identification/454c8e6d4f6f9a9ec0b2fcb10b4cb958ac702e55/data/recorded_trajectories"
@@ -308,6 +308,14 @@ def local_copies() -> Path | None:
     """The folder that the environment variable ARMLAB_RECORDINGS names; None where it is unset or blank."""
     folder = os.environ.get(LOCAL_COPIES_VARIABLE, "").strip()
     return Path(folder) if folder else None
+
+
+def local_recording(name: str) -> Path | None:
+    """A recording folder of this name among the local copies; None where there is none, and for a public recording."""
+    folder = local_copies()
+    if folder is None or name in PUBLIC_RECORDINGS or not (folder / name / FILE_NAME).is_file():
+        return None
+    return folder / name
 
 
 def fetch_recording(name: str, folder: Path) -> Path:

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from armlab.common.arrays import Array
 from armlab.common.dahl import dahl_state
-from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.settings import Settings, vary
 from armlab.diagnosis.torque.columns.blocks import WhitenedRows, block_covariance, held_out_gain, variance_inflation
 from armlab.diagnosis.torque.columns.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.torque.columns.links import link_prior
@@ -355,3 +355,20 @@ def test_a_second_look_adds_what_a_scan_finds_then_and_leaves_what_was_there(des
     more = [each.candidate for each in again.blocks[len(first.blocks) :]]
     assert {(each.effect, each.joint) for each in more} == {("external_contact", 1)}
     assert more[0].shape == pytest.approx((200 / cases.RATE_HZ, 300 / cases.RATE_HZ), abs=0.2)
+
+
+def test_short_runs_are_cut_into_blocks_that_count() -> None:
+    """Where no run that validates is long enough, no block is shorter than a stretch that counts."""
+    recording = cases.recording(seconds=6.0)
+    long = [replace(each, role="identify") for each in recording.runs[:1]]
+    step = observe(long, recording.arm, recording.arm.parameters, Settings())
+    rows = len(step.signals[0].torque)
+    least = rows // 4
+    few = vary(Settings(), "data.min_segment_rows", least)
+    short = replace(recording.runs[1].rows(slice(None, 30)), role="validate")
+    found = observe([*long, short], recording.arm, recording.arm.parameters, few)
+    assert found.held_out_blocks
+    assert [each.role for each in found.segments] == ["identify", "identify", "validate", "identify", "identify"]
+    assert min(each.stop - each.start for each in found.segments[:4]) >= least
+    lost = observe([short], recording.arm, recording.arm.parameters, few)
+    assert "held out: record longer runs" in str(lost.reason_too_short(recording.arm))

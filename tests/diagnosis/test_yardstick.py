@@ -95,6 +95,6 @@ def test_a_model_wins_by_more_than_a_small_share_in_the_mean_of_the_joints() -> 
 
 
 def test_runs_that_are_too_short_have_no_yardstick() -> None:
-    short = [replace(run.rows(slice(None, 30)), role="identify") for run in recording.runs[:1]]
+    short = [replace(run.rows(slice(None, 12)), role="identify") for run in recording.runs[:1]]
     few = observe(short, simulation.arm, simulation.inertial, Settings())
     assert fit_yardstick(recording.arm, few) is None

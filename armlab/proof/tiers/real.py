@@ -29,7 +29,7 @@ from armlab.proof.blind.sealed import (
     is_made,
     one_thread_environment,
 )
-from armlab.recordings.public import LOCAL_COPIES_VARIABLE, PUBLIC_RECORDINGS, is_available
+from armlab.recordings.public import LOCAL_COPIES_VARIABLE, PUBLIC_RECORDINGS, is_available, local_recording
 
 LOOKS_FOLDER = SOURCE_ROOT / "results" / "real"  # of the log of looks at the validation runs of real recordings
 MADE = "made"  # among the drafts: cases as the command makes them, all of one recording at once
@@ -51,7 +51,10 @@ class RealCase:
 
 @dataclass(frozen=True)
 class RealSet:
-    """Which recordings, how many random cases of each, and the seed; seeds 1000-1999 are for development."""
+    """Which recordings, how many random cases of each, and the seed; seeds 1000-1999 are for development.
+
+    A recording is a public one or a folder of the local copies.
+    """
 
     recordings: tuple[str, ...]
     cases: int
@@ -75,7 +78,7 @@ def prove_real(settings: RealSet, work: Path, results: Path, jobs: int, commit: 
     cases and verdicts, where an interrupted proof continues. results: folder of page, tables and figures. commit: of a
     judged proof, which is logged once. InputError for a folder of another set.
     """
-    found = tuple(name for name in settings.recordings if is_available(PUBLIC_RECORDINGS[name]))
+    found = tuple(name for name in settings.recordings if _is_here(name))
     for name in settings.recordings:
         if name not in found:
             yield f"{name} is left out: it is neither in the folder {LOCAL_COPIES_VARIABLE} nor in the cache"
@@ -92,6 +95,12 @@ def prove_real(settings: RealSet, work: Path, results: Path, jobs: int, commit: 
             folders = ["--make", made, "--recordings", fetched, "--results", str(LOOKS_FOLDER)]
             yield from _run_command(["proof", "real-concealed", *own.options, *folders])
     yield from REAL.prove(chosen, work, results, jobs, commit)
+
+
+def _is_here(name: str) -> bool:
+    if name in PUBLIC_RECORDINGS:
+        return is_available(PUBLIC_RECORDINGS[name])
+    return local_recording(name) is not None
 
 
 def _make(case: RealCase, draft: Path) -> None:

@@ -52,8 +52,8 @@ QUICK_RECORDINGS = ("emps", "staubli-tx40")  # of the tier of real recordings
 class Proof:
     """What the tiers of a proof share. name: of its folder. commit: of the code, None for one that is not judged.
 
-    quick: a few cases of each tier. sizes: other numbers of cases, by their kind. folders: recordings with a D-H table
-    that stand beside the public ones in the setup tier.
+    quick: a few cases of each tier. sizes: other numbers of cases, by their kind. folders: recordings of the local
+    copies that stand beside the public ones in the setup tier (with a D-H table) and that of real recordings.
     """
 
     name: str
@@ -117,7 +117,7 @@ def _prove_tier(proof: Proof, tier: TierName, work: Path, results: Path, jobs: i
         case "motion":
             return MOTION.prove(MotionSet(**sizes, seed=seed), work, folder, jobs, commit)
         case "real":
-            recordings = QUICK_RECORDINGS if proof.quick else PUBLIC
+            recordings = (*(QUICK_RECORDINGS if proof.quick else PUBLIC), *proof.folders)
             return prove_real(RealSet(recordings, **sizes, seed=seed), work, folder, jobs, commit)
         case "changes":
             return CHANGES.prove(PairSet(**sizes, seed=seed), work, folder, jobs, commit)

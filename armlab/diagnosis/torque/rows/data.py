@@ -204,11 +204,12 @@ class Observed:
         """Why nothing can be said of a joint: it is never in motion for long enough in what is fitted, or in what is
         held out; None where all are.
         """
-        roles = [role for role in ROLES if self.of_role(role)]
-        short = [joint + 1 for joint in range(self.joints) if not all(self.of_role(role, joint) for role in roles)]
+        least = self.min_segment_rows / self.rate_hz
+        if not all(self.of_role(role) for role in ROLES):
+            return f"no run is so long that {least:.2g} s of it can be held out: record longer runs"
+        short = [joint + 1 for joint in range(self.joints) if not all(self.of_role(role, joint) for role in ROLES)]
         if not short:
             return None
-        least = self.min_segment_rows / self.rate_hz
         return f"{joint_in_words(arm, short[0])} is never in motion for {least:.2g} s on end: record longer runs"
 
     def at_rest(self, role: Role, joint: int) -> NDArray[np.intp]:
@@ -244,7 +245,9 @@ def observe(runs: Sequence[Run], arm: Arm, inertial: Array | None, settings: Set
     motion = min(tuning.position_cutoff_ratio * cutoff, tuning.max_position_cutoff_ratio * rate)
     signals = tuple(differentiate(run, cutoff_hz=motion, torque_cutoff_hz=cutoff, step=step) for run in even)
     calm = tuple(_smooth_motion(run, motion) for run in even)
-    blocks = not any(run.role == "validate" for run in runs)
+    blocks = not any(
+        each.run.role == "validate" and len(each.torque) >= tuning.min_segment_rows for each in signals
+    )
     segments = _split_runs(signals, blocks, tuning)
     moving = moving_rows(signals, segments, motion, tuning)
     return Observed(signals, calm, segments, rate / step, blocks, moving, tuning.min_segment_rows)
@@ -274,6 +277,7 @@ def _smooth_motion(run: Run, highest_hz: float) -> Motion:
 
 
 def _split_runs(signals: Sequence[Signals], blocks: bool, tuning: DataTuning) -> tuple[Segment, ...]:
+    """The runs by their roles, or blocks of them: no block is shorter than a stretch that counts."""
     out: list[Segment] = []
     start = 0
     for index, each in enumerate(signals):
@@ -281,7 +285,8 @@ def _split_runs(signals: Sequence[Signals], blocks: bool, tuning: DataTuning) ->
         if not blocks:
             out.append(Segment(index, each.run.role, start, stop))
         else:
-            count, every = tuning.held_out_blocks, tuning.held_out_every
+            every = tuning.held_out_every
+            count = max(min(tuning.held_out_blocks, (stop - start) // tuning.min_segment_rows), 1)
             pairs = pairwise(np.linspace(start, stop, count + 1).astype(int).tolist())
             roles: list[Role] = ["validate" if number % every == every - 1 else "identify" for number in range(count)]
             out += [Segment(index, role, a, b) for role, (a, b) in zip(roles, pairs, strict=True)]

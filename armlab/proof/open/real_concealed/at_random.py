@@ -31,7 +31,8 @@ from armlab.proof.open.real_concealed.examine import (
 from armlab.proof.open.real_concealed.observation import read_observation, write_observation
 from armlab.proof.open.real_identification.identify_recording import recipe_named
 from armlab.proof.open.real_identification.looks import LOOKS_FILE, Looks
-from armlab.recordings.public import open_public_recording
+from armlab.recordings.load import load_recording
+from armlab.recordings.public import local_recording, open_public_recording
 from armlab.recordings.reading.words import NAMES as MISTAKE_NAMES
 from armlab.report.words import effect_in_words
 
@@ -57,7 +58,10 @@ RECORDING_COLUMNS = ("recording", "reference", "control")
 
 @dataclass(frozen=True)
 class RandomCases:
-    """Which recordings, how many cases of each, and the seed. Seeds 1000-1999 are for development."""
+    """Which recordings, how many cases of each, and the seed. Seeds 1000-1999 are for development.
+
+    A recording is a public one or a folder of the local copies.
+    """
 
     recordings: tuple[str, ...]
     cases: int
@@ -66,7 +70,7 @@ class RandomCases:
     def __post_init__(self) -> None:
         """Raises InputError for an unknown recording."""
         for name in self.recordings:
-            if name not in REAL_ARMS:
+            if name not in REAL_ARMS and local_recording(name) is None:
                 raise InputError(f"unknown recording '{name}': {suggest_name(name, list(REAL_ARMS))}")
 
 
@@ -112,7 +116,9 @@ def make_cases(
     looks = Looks(results / LOOKS_FILE)
     for name in settings.recordings:
         progress(f"{name}: the reference model")
-        reference = identify_reference(open_public_recording(name, recordings), recipe_named(name))
+        folder_here = local_recording(name)
+        recording = open_public_recording(name, recordings) if folder_here is None else load_recording(folder_here)
+        reference = identify_reference(recording, recipe_named(name))
         yield f"{name}: reference {reference.description}"
         drawn = (DrawnCase(Case(name), 0.0), *draw_cases(reference, settings.seed, settings.cases))
         for number, each in enumerate(drawn):

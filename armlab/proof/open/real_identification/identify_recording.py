@@ -4,7 +4,7 @@ A recipe is what is given to this procedure for each recording before it looks a
 """
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -39,7 +39,7 @@ class Recipe:
     """
 
     name: str
-    best_known: dict[str, float]
+    best_known: dict[str, float] = field(default_factory=dict)
     starts: tuple[tuple[str, ...], ...] = (USUAL_GROUPS,)
     physical: bool = False
     payload: tuple[float, float, float] | None = None
@@ -99,8 +99,8 @@ class Study:
 
 
 def recipe_named(name: str) -> Recipe:
-    """The recipe of a public recording."""
-    return next(each for each in RECIPES if each.name == name)
+    """The recipe of a recording; one of which nothing is known beforehand has the usual one."""
+    return next((each for each in RECIPES if each.name == name), Recipe(name))
 
 
 def study_recording(recipe: Recipe, recording: Recording) -> Study:
