@@ -4,7 +4,13 @@ from dataclasses import replace
 
 from armlab.diagnosis.result import Weighed, WeighedName
 from armlab.proof.open.real_concealed.at_random import RandomStudy, random_tables
-from armlab.proof.open.real_concealed.claims import DrawnVerdict, LabelledFinding, judge_drawn, label_weighed
+from armlab.proof.open.real_concealed.claims import (
+    DrawnVerdict,
+    LabelledFinding,
+    judge_drawn,
+    label_weighed,
+    with_own_findings,
+)
 from armlab.proof.open.real_concealed.conceal import SoughtEffect
 from armlab.proof.open.real_concealed.concealed_case import Case, Disturbance
 from armlab.proof.open.real_concealed.draw import DrawnCase
@@ -140,3 +146,12 @@ def test_nobody_knows_whether_what_the_control_names_is_right() -> None:
     assert not any(known.right)
     (sought,) = _labels(_weighed("cable_stiffness"), control=(_said("cable_stiffness", 2),))
     assert sought.right == (True, False)
+
+
+def test_what_half_of_the_cases_name_is_of_the_arm_though_the_control_misses_it() -> None:
+    """Each case conceals something else; what is concealed in a case does not count there."""
+    friction, ripple, spring = _said("coulomb_friction", 1), _said("torque_ripple", 3), _said("cable_stiffness", 2)
+    said = [(friction, ripple), (spring,), (friction, spring), (spring, _said("unknown", 3))]
+    cases = [(ExaminedCase(str(at), each, 0.1), (SPRING,) if at else ()) for at, each in enumerate(said)]
+    own = with_own_findings(ExaminedCase("control", (ripple,), 0.1), cases, 3)
+    assert own.findings == (ripple, friction)

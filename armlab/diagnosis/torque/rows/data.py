@@ -245,9 +245,7 @@ def observe(runs: Sequence[Run], arm: Arm, inertial: Array | None, settings: Set
     motion = min(tuning.position_cutoff_ratio * cutoff, tuning.max_position_cutoff_ratio * rate)
     signals = tuple(differentiate(run, cutoff_hz=motion, torque_cutoff_hz=cutoff, step=step) for run in even)
     calm = tuple(_smooth_motion(run, motion) for run in even)
-    blocks = not any(
-        each.run.role == "validate" and len(each.torque) >= tuning.min_segment_rows for each in signals
-    )
+    blocks = not any(each.run.role == "validate" and len(each.torque) >= tuning.min_segment_rows for each in signals)
     segments = _split_runs(signals, blocks, tuning)
     moving = moving_rows(signals, segments, motion, tuning)
     return Observed(signals, calm, segments, rate / step, blocks, moving, tuning.min_segment_rows)

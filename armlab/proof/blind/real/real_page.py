@@ -34,7 +34,8 @@ INTRODUCTION = f"""\
 A model of each real arm is identified from its identification runs. It stands for the simulation. Then something known
 is concealed at random: a disturbance is added to the recorded torque of all runs, or a part of the model is withheld.
 The diagnosis gets the recording and the model. Kind, place, numbers and size follow from the seed, and each kind comes
-once before any comes twice. The control is the same recording with nothing concealed. A claim is *new* where the
+once before any comes twice. The control is the same recording with nothing concealed; what half of the cases of the
+recording name, or more, each of which conceals something else, stands beside what it names. A claim is *new* where the
 control does not name the effect there; of what is sought, where the control does not name that size.
 
 *Strength* is the RMS of the concealed torque over the RMS error of the model on the identification runs, at the joint

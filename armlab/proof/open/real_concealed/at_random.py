@@ -17,7 +17,13 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.common.settings import read_json, suggest_name
 from armlab.effects.library import EFFECT_IDS, effect_named
-from armlab.proof.open.real_concealed.claims import DrawnVerdict, LabelledFinding, judge_drawn, label_weighed
+from armlab.proof.open.real_concealed.claims import (
+    DrawnVerdict,
+    LabelledFinding,
+    judge_drawn,
+    label_weighed,
+    with_own_findings,
+)
 from armlab.proof.open.real_concealed.conceal import ReferenceModel, SoughtEffect, identify_reference
 from armlab.proof.open.real_concealed.concealed_case import Case
 from armlab.proof.open.real_concealed.draw import DrawnCase, draw_cases
@@ -178,6 +184,8 @@ def _read_outcome(folder: Path) -> ExaminedCase:
 
 
 def _judge(name: str, judged: Sequence[tuple[RandomTruth, ExaminedCase]], control: ExaminedCase) -> RandomStudy:
+    cases = [(outcome, truth.sought) for truth, outcome in judged]
+    control = with_own_findings(control, cases, judged[0][0].joints)
     verdicts = tuple(
         judge_drawn(DrawnCase(truth.case, truth.strength), outcome, truth.sought, control, truth.joints)
         for truth, outcome in judged

@@ -2,8 +2,9 @@
 that were weighed are right, from which probabilities are learnt.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from armlab.diagnosis.result import WeighedName
@@ -57,6 +58,26 @@ class DrawnVerdict:
     outcome: ExaminedCase
     claims: tuple[JudgedClaim, ...]
     parts: tuple[AnsweredPart, ...]
+
+
+def with_own_findings(
+    control: ExaminedCase, cases: Sequence[tuple[ExaminedCase, tuple[SoughtEffect, ...]]], joints: int
+) -> ExaminedCase:
+    """The control with what it misses by chance: what half of the cases of the recording name, or more, though it is
+    not concealed there. Each case conceals something else, so that is of the arm or of how it was recorded.
+
+    cases: each with what is concealed in it. joints: of the arm.
+    """
+    judge = BesideControl(control, joints)
+    counts, found = Counter[Name](), dict[Name, ReportedFinding]()
+    for outcome, wanted in cases:
+        new = (each for each in outcome.findings if each.effect != UNKNOWN.id and _is_new(judge, each, ()))
+        own = {judge.common_key(each.effect, each.joints): each for each in new}
+        sought = {key for each in wanted for key in judge.common_keys(each)}
+        counts.update(own.keys() - sought)
+        found |= own
+    often = tuple(found[key] for key, count in counts.items() if 2 * count >= len(cases) > 2)
+    return replace(control, findings=(*control.findings, *often))
 
 
 def judge_drawn(

@@ -22,6 +22,7 @@ from armlab.proof.open.real_concealed.conceal import (
 from armlab.proof.open.real_concealed.concealed_case import Case
 from armlab.recordings.reading.answer import SetupFinding
 from armlab.recordings.recording import Recording
+from problem.robot_file import built_in_arms
 
 Span = tuple[float, float]
 
@@ -123,9 +124,12 @@ def joints_of(joint: int | None, joints: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def conceal_case(reference: ReferenceModel, case: Case, path: Path) -> Recording:
-    """The recording that a diagnosis gets. path: where the simulation that is handed over is written."""
+    """The recording that a diagnosis gets. path: where the simulation that is handed over is written, beside the robot
+    file of the recording where it has one.
+    """
     recording, what = reference.recording, case.injected
-    write_model(withhold_pieces(reference.model, case.withheld), path)
+    robot = recording.robot if recording.robot in built_in_arms() else str(path.parent / recording.robot)
+    write_model(replace(withhold_pieces(reference.model, case.withheld), robot=robot), path)
     runs = recording.runs
     if what is not None:
         runs = tuple(add_disturbance(run, recording.arm, what)[0] for run in runs)
