@@ -19,10 +19,11 @@ _FILE = click.Path(path_type=Path)
 @click.option("--only", multiple=True, help="Name of a public recording or of a folder, repeatable [default: all].")
 @click.option(
     "--part",
-    type=click.Choice(["all", "folders", "public"]),
+    type=click.Choice(["all", "folders", "public", "pieces"]),
     default="all",
     show_default=True,
-    help="Recording folders below ARMLAB_RECORDINGS, or the public recordings that are fetched.",
+    help="Recording folders below ARMLAB_RECORDINGS, the public recordings that are fetched, or halves and thinned "
+    "copies of the folders; all: folders and public.",
 )
 @click.option("--facts", type=_FILE, help="What is known of the folders: facts/1, see docs/recordings.md.")
 @click.option("--jobs", type=JobCount(), default=2, show_default=True, help="Folders that are diagnosed at a time.")
@@ -59,21 +60,26 @@ def real(
     of plain least squares. Writes folders.md, folders.csv and folders_joints.csv with the folders whose facts do not
     say `licence: none`, and a page of all folders into the work folder. An interrupted command continues.
 
+    With --part pieces both halves of each recording of which facts are known, and one of two rows of it, are judged by
+    what is known of the whole: pieces.md, pieces.csv and pieces_joints.csv.
+
     Public recordings are identified and diagnosed on the same runs. Writes arms.md, arms.csv and arms.svg; with
     --leave-one-out leave_one_out.md and .csv instead.
     """
     from armlab.proof.open.real_arms.leave_one_out import leave_arms_out
-    from armlab.proof.open.real_folders.all_folders import FolderProof
+    from armlab.proof.open.real_folders.all_folders import FolderProof, prove_pieces
     from armlab.proof.open.real_folders.parts import PublicProof, prove_on_real_arms
     from armlab.recordings.public import local_copies
 
-    if leave_one_out and (peers is not None or facts is not None or part == "folders"):
-        raise InputError("--leave-one-out takes public recordings alone: leave out --peers, --facts, --part folders")
+    if leave_one_out and (peers is not None or facts is not None or part in ("folders", "pieces")):
+        raise InputError(f"--leave-one-out takes public recordings alone: leave out --peers, --facts, --part {part}")
     if part == "public" and facts is not None:
         raise InputError("--facts are about folders: leave out --facts or --part public")
     if leave_one_out:
         return leave_arms_out(results, recordings, only, tell_progress)
     folders = None if part == "public" else FolderProof(local_copies(), facts, results, work, jobs)
+    if folders is not None and part == "pieces":
+        return prove_pieces(folders, only)
     arms = None if part == "folders" else PublicProof(results, recordings, peers)
     return prove_on_real_arms(folders, arms, only, tell_progress)
 

@@ -14,7 +14,7 @@ from small_recordings import frame, recording_in
 from armlab.cli.main import main
 from armlab.common.errors import InputError
 from armlab.proof.open.real_folders import runs
-from armlab.proof.open.real_folders.all_folders import FolderProof, prove_folders
+from armlab.proof.open.real_folders.all_folders import FolderProof, prove_folders, prove_pieces
 from armlab.proof.open.real_folders.errors import error_ratio, measure_errors
 from armlab.proof.open.real_folders.recording_folders import find_folders
 from armlab.recordings.public import LOCAL_COPIES_VARIABLE
@@ -108,6 +108,29 @@ def test_a_run_goes_on_where_it_stopped_and_asks_again_for_another_recording(pro
     (proof.root / "open" / "run.csv").write_text("t,q1\n")
     list(prove_folders(proof))
     assert asked(proof) == ["broken", "open", "open", "secret"]
+
+
+def test_pieces_are_judged_by_what_is_known_of_the_whole(proof: FolderProof) -> None:
+    assert proof.root is not None
+    assert proof.facts is not None
+    recording_in(proof.root / "told", frame(7), frame(8), sample_rate_hz=100.0)
+    singles = FACTS["singles"] | {"told": {"known": [{"effect": ["payload"], "joint": 3}]}}
+    proof.facts.write_text(yaml.safe_dump(FACTS | {"singles": singles}))
+    lines = list(prove_pieces(proof, ["told"]))
+    pieces = ("first-half", "second-half", "every-second-row")
+    assert all(any(line.startswith(f"told--{each}: status mismatch, named 1") for line in lines) for each in pieces)
+    page = (proof.results / "pieces.md").read_text()
+    assert "# Pieces of recording folders" in page
+    assert "| told--second-half |" in page
+    cut = [(proof.work / "cut" / f"told--{each}" / "run-1.csv").read_text().splitlines()[1:] for each in pieces]
+    whole = (proof.root / "told" / "run-1.csv").read_text().splitlines()[1:]
+    assert (cut[0] + cut[1], cut[2]) == (whole, whole[::2])
+    assert "sample_rate_hz: 50.0" in (proof.work / "cut" / "told--every-second-row" / "recording.yaml").read_text()
+
+
+def test_pieces_without_facts_are_refused(proof: FolderProof) -> None:
+    with pytest.raises(InputError, match="--part pieces needs --facts FILE"):
+        list(prove_pieces(FolderProof(proof.root, None, proof.results, proof.work, jobs=1)))
 
 
 @pytest.mark.parametrize(

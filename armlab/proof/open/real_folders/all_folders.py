@@ -1,4 +1,4 @@
-"""`armlab proof real` with recording folders: diagnose each, measure its errors, hold it against facts, report.
+"""`armlab proof real` with recording folders or pieces of them: diagnose, measure errors, hold against facts, report.
 
 Rows about a folder without a licence, or of which nothing is known, stand on a page in the work folder alone.
 """
@@ -16,6 +16,7 @@ from armlab.proof.open.real_folders.consistency import contradictions
 from armlab.proof.open.real_folders.errors import FolderErrors, measure_change, measure_errors
 from armlab.proof.open.real_folders.facts import FactsFile, PairFacts, SingleFacts, read_facts
 from armlab.proof.open.real_folders.facts_score import FolderScore, score_missing, score_pair, score_single
+from armlab.proof.open.real_folders.pieces import facts_of_pieces, write_pieces
 from armlab.proof.open.real_folders.recording_folders import (
     NEW,
     OLD,
@@ -66,8 +67,25 @@ def prove_folders(settings: FolderProof, only: Sequence[str] = ()) -> Iterator[s
     only: names of folders, all if it is empty. Raises InputError for a wrong facts file and unknown names.
     """
     every = settings.find()
+    yield from _prove(choose_folders(every, only), settings.read_facts(every), settings, "folders")
+
+
+def prove_pieces(settings: FolderProof, only: Sequence[str] = ()) -> Iterator[str]:
+    """The same of pieces of the single recordings of which something is known; raises InputError without facts, too."""
+    every = settings.find()
     facts = settings.read_facts(every)
-    runs = plan_runs(choose_folders(every, only), settings.work)
+    if facts is None:
+        raise InputError("--part pieces needs --facts FILE: what is known of the whole judges its pieces")
+    known = [each for each in choose_folders(every, only) if each.name in facts.singles]
+    pieces = list(write_pieces(known, settings.work / "cut"))
+    yield from _prove(pieces, facts_of_pieces(facts), settings, "pieces")
+
+
+def _prove(
+    folders: Sequence[RecordingFolder], facts: FactsFile | None, settings: FolderProof, pages: str
+) -> Iterator[str]:
+    """pages: the name of the pages without their suffix."""
+    runs = plan_runs(folders, settings.work)
     write_texts({".gitignore": IGNORED}, settings.work)
     yield from run_missing(runs, settings.jobs)
     measured = Parallel(n_jobs=settings.jobs, return_as="generator")(
@@ -79,7 +97,7 @@ def prove_folders(settings: FolderProof, only: Sequence[str] = ()) -> Iterator[s
         yield rows[-1].line
         yield from (f"  {remark}" for remark in rows[-1].remarks)
     yield from total_lines(rows)
-    yield from _write(rows, settings)
+    yield from _write(rows, settings, pages)
 
 
 def _measure(run: FolderRun, known: SingleFacts | PairFacts | None) -> FolderErrors:
@@ -124,13 +142,13 @@ def _score(known: SingleFacts | PairFacts, verdict: ToldVerdict | None, facts: F
     return score_pair(known, verdict, facts)
 
 
-def _write(rows: Sequence[FolderRow], settings: FolderProof) -> Iterator[str]:
+def _write(rows: Sequence[FolderRow], settings: FolderProof, pages: str) -> Iterator[str]:
     """The pages: licensed folders among the results, all of them in the work folder."""
     licensed = [each for each in rows if each.licensed]
     if licensed:
-        note = f"{len(licensed)} folders that may be published, of {len(rows)} that were diagnosed."
+        note = f"{len(licensed)} {pages} that may be published, of {len(rows)} that were diagnosed."
         all_totals = "\n\n".join(f"Over all {len(rows)}: {line}" for line in total_lines(rows)[1:])
-        texts = table_texts(licensed, f"{note}\n\n{all_totals}" if len(licensed) < len(rows) else note)
+        texts = table_texts(pages, licensed, f"{note}\n\n{all_totals}" if len(licensed) < len(rows) else note)
         yield from (f"wrote {path}" for path in write_texts(texts, settings.results))
-    local = table_texts(rows, f"All {len(rows)} folders that were diagnosed. Not to be published.")
-    yield from (f"wrote {path} (local: all folders)" for path in write_texts(local, settings.work))
+    local = table_texts(pages, rows, f"All {len(rows)} {pages} that were diagnosed. Not to be published.")
+    yield from (f"wrote {path} (local: all {pages})" for path in write_texts(local, settings.work))

@@ -13,7 +13,7 @@ from armlab.proof.open.real_folders.runs import FolderOutcome
 from armlab.proof.open.real_folders.stated_names import FACT_RANKS, ToldVerdict
 from armlab.recordings.plain_least_squares import SEEN_ERRORS
 
-PAGE_NAME, TABLE_NAME, JOINTS_NAME = "folders.md", "folders.csv", "folders_joints.csv"
+TITLES = {"folders": "Recording folders", "pieces": "Pieces of recording folders"}
 FOLDER_HEADINGS = (
     "folder",
     "status",
@@ -185,12 +185,12 @@ def _middle(counts: Sequence[int]) -> int:
     return sorted(counts)[len(counts) // 2] if counts else 0
 
 
-def folders_markdown(rows: Sequence[FolderRow], note: str) -> str:
+def folders_markdown(title: str, rows: Sequence[FolderRow], note: str) -> str:
     """The page of these rows. note: which folders it holds."""
     joints = [cells for each in rows for cells in each.joint_cells]
     remarks = [f"- {each.folder.name}: {remark}" for each in rows for remark in each.remarks]
     return markdown_page(
-        "Recording folders",
+        title,
         note,
         EXPLANATION,
         _markdown(FOLDER_HEADINGS, [each.cells for each in rows]),
@@ -215,10 +215,10 @@ def csv_text(headings: Sequence[str], rows: Iterable[dict[str, str]]) -> str:
     return out.getvalue()
 
 
-def table_texts(rows: Sequence[FolderRow], note: str) -> dict[str, str]:
-    """Page and tables by the names of their files."""
+def table_texts(pages: str, rows: Sequence[FolderRow], note: str) -> dict[str, str]:
+    """Page and tables by the names of their files. pages: that name without its suffix, of `TITLES`."""
     return {
-        PAGE_NAME: folders_markdown(rows, note),
-        TABLE_NAME: csv_text(FOLDER_HEADINGS, (each.cells for each in rows)),
-        JOINTS_NAME: csv_text(JOINT_HEADINGS, (cells for each in rows for cells in each.joint_cells)),
+        f"{pages}.md": folders_markdown(TITLES[pages], rows, note),
+        f"{pages}.csv": csv_text(FOLDER_HEADINGS, (each.cells for each in rows)),
+        f"{pages}_joints.csv": csv_text(JOINT_HEADINGS, (cells for each in rows for cells in each.joint_cells)),
     }
