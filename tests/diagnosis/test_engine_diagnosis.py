@@ -204,7 +204,7 @@ def test_physics_that_does_not_carry_over_is_told_and_what_nothing_explains_is_n
     found = _only_if_explained(replace(viscous_found, left=left), None, Settings().tuning.reading)
     assert found.status == status
     told = summary_of(found).replace("\N{NO-BREAK SPACE}", " ")
-    assert ("10 % of the torque that it was fitted to, and 90 % of what was held out" in told) == (fitted < 0.5)
+    assert ("leaves 10 % where it was fitted, and 90 % where it was not" in told) == (fitted < 0.5)
     assert "viscous friction" in told or fitted > 0.5
 
 

@@ -84,14 +84,14 @@ def _only_if_explained(found: Diagnosis, setup: Answer | None, tuning: ReadingTu
         return replace(found, carries_over=False)
     tried = f", however it is read ({setup.looks} readings were tried)" if setup is not None and setup.looks > 1 else ""
     reason = (
-        f"Links, friction and all other physics leave {share:.0%} of the recorded torque{tried}: another robot, or "
-        "torque that is none? Move one joint alone and see which columns change."
+        f"Links, friction and all other physics leave {share:.0%} of the variation of the torque{tried}: another "
+        "robot, or torque that is none? Move one joint alone and see which columns change."
     )
     if fitted <= tuning.max_unexplained:
         reason = (
-            f"The model leaves {fitted:.0%} of the torque that it was fitted to, and {share:.0%} of what was held out: "
-            "the motion is too short, or too unlike what was held out, to tell its numbers. Record longer runs in "
-            "which all joints move."
+            f"Of the variation of the torque the model leaves {fitted:.0%} where it was fitted, and {share:.0%} where "
+            "it was not: the motion is too short, or too unlike what was held out, to tell its numbers. Record longer "
+            "runs in which all joints move."
         )
     return Diagnosis(found.recording, found.simulation, "inconclusive", reason, found.observed)
 

@@ -159,13 +159,13 @@ class _Writer:
     def _gain(self) -> str:
         """How far the held-out error falls where it falls most, and what that leaves of the torque.
 
-        Of a model that does not carry over, what it leaves of both, and what to do.
+        Of a model that does not carry over, what it leaves of the variation of both, and what to do.
         """
         if not self.diagnosis.carries_over:
             fitted, held_out = (format_percent(self.diagnosis.left[role]) for role in ROLES)
             return (
-                f"The model leaves {fitted} of the torque that it was fitted to, and {held_out} of what was held out: "
-                "record longer runs in which all joints move."
+                f"Of the variation of the torque the model leaves {fitted} where it was fitted, and {held_out} where "
+                "it was not: record longer runs in which all joints move."
             )
         fit, before = self._largest_fall()
         arm, unit = self.diagnosis.simulation.arm, joint_unit(self.diagnosis.simulation.arm, fit.joint - 1)
