@@ -47,9 +47,12 @@ def _write_piece(whole: Path, runs: Sequence[str], piece: str, out: Path) -> Non
         heading, *rows = (whole / file).read_text(encoding="utf-8").splitlines(keepends=True)
         (out / file).write_text("".join([heading, *PIECES[piece](rows)]), encoding="utf-8")
     content = read_yaml(whole / FILE_NAME)
+    for key in ("robot", "simulation"):
+        if content.get(key) and (whole / content[key]).is_file() and not (out / content[key]).is_file():
+            content[key] = str((whole / content[key]).resolve())
     if piece == THINNED and content.get("sample_rate_hz"):
         content["sample_rate_hz"] /= 2
-        (out / FILE_NAME).write_text(yaml.safe_dump(to_plain_data(content), sort_keys=False), encoding="utf-8")
+    (out / FILE_NAME).write_text(yaml.safe_dump(to_plain_data(content), sort_keys=False), encoding="utf-8")
 
 
 def facts_of_pieces(facts: FactsFile) -> FactsFile:
