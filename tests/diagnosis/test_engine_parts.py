@@ -372,3 +372,15 @@ def test_short_runs_are_cut_into_blocks_that_count() -> None:
     assert min(each.stop - each.start for each in found.segments[:4]) >= least
     lost = observe([short], recording.arm, recording.arm.parameters, few)
     assert "held out: record longer runs" in str(lost.reason_too_short(recording.arm))
+
+
+def test_shorter_stretches_count_where_a_joint_has_no_others(observed: Observed) -> None:
+    """The run that validates has less than a stretch of the usual length, and none can be cut into blocks."""
+    recording = cases.recording(seconds=6.0)
+    rows = max(each.stop - each.start for each in observed.of_role("validate"))
+    usual = vary(Settings(), "data.min_segment_rows", int(1.5 * rows))
+    runs = [recording.runs[0], replace(recording.runs[1], role="validate")]
+    found = observe(runs, recording.arm, recording.arm.parameters, usual)
+    assert found.min_segment_rows == int(1.5 * rows) // 2
+    assert not found.held_out_blocks
+    assert found.reason_too_short(recording.arm) is None

@@ -1,7 +1,7 @@
 """Runs as the diagnosis sees them: filtered and thinned signals, and which rows identify, validate or stand still."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -200,16 +200,19 @@ class Observed:
         """The rows (rows,) that took no part in a fit, and in which a joint (from 0) moves."""
         return rows_in(self.of_role("validate", joint), self.rows)
 
+    def short_joints(self) -> list[int]:
+        """Joints (from 1) that have no stretch in motion in what is fitted, or in what is held out."""
+        return [joint + 1 for joint in range(self.joints) if not all(self.of_role(role, joint) for role in ROLES)]
+
     def reason_too_short(self, arm: Arm) -> str | None:
         """Why nothing can be said of a joint: it is never in motion for long enough in what is fitted, or in what is
         held out; None where all are.
         """
-        least = self.min_segment_rows / self.rate_hz
-        if not all(self.of_role(role) for role in ROLES):
-            return f"no run is so long that {least:.2g} s of it can be held out: record longer runs"
-        short = [joint + 1 for joint in range(self.joints) if not all(self.of_role(role, joint) for role in ROLES)]
+        least, short = self.min_segment_rows / self.rate_hz, self.short_joints()
         if not short:
             return None
+        if not all(self.of_role(role) for role in ROLES):
+            return f"no run is so long that {least:.2g} s of it can be held out: record longer runs"
         return f"{joint_in_words(arm, short[0])} is never in motion for {least:.2g} s on end: record longer runs"
 
     def at_rest(self, role: Role, joint: int) -> NDArray[np.intp]:
@@ -235,8 +238,14 @@ class Observed:
         return self.of_role("identify", joint) + self.of_role("validate", joint)
 
 
+SHORTER = (1, 2, 4)  # parts of the usual shortest stretch: the longest that every joint has, in each role
+
+
 def observe(runs: Sequence[Run], arm: Arm, inertial: Array | None, settings: Settings) -> Observed:
-    """Smooths, differentiates, filters and thins the runs. inertial: (10 * joints,) of the simulated links, if any."""
+    """Smooths, differentiates, filters and thins the runs. inertial: (10 * joints,) of the simulated links, if any.
+
+    Where a joint has no stretch in motion of the usual length, shorter ones count.
+    """
     tuning = settings.tuning.data
     even = _to_common_rate([resample_evenly(run) for run in runs])
     rate = even[0].rate_hz
@@ -245,10 +254,23 @@ def observe(runs: Sequence[Run], arm: Arm, inertial: Array | None, settings: Set
     motion = min(tuning.position_cutoff_ratio * cutoff, tuning.max_position_cutoff_ratio * rate)
     signals = tuple(differentiate(run, cutoff_hz=motion, torque_cutoff_hz=cutoff, step=step) for run in even)
     calm = tuple(_smooth_motion(run, motion) for run in even)
-    blocks = not any(each.run.role == "validate" and len(each.torque) >= tuning.min_segment_rows for each in signals)
+    rows = tuple(dict.fromkeys(max(tuning.min_segment_rows // share, 1) for share in SHORTER))
+    tried = (
+        _with_segments(signals, calm, motion, rate / step, replace(tuning, min_segment_rows=each)) for each in rows
+    )
+    first = next(tried)
+    return first if not first.short_joints() else next((each for each in tried if not each.short_joints()), first)
+
+
+def _with_segments(
+    signals: tuple[Signals, ...], calm: tuple[Motion, ...], cutoff_hz: float, rate_hz: float, tuning: DataTuning
+) -> Observed:
+    """cutoff_hz: of the positions. rate_hz: of the kept rows."""
+    least = tuning.min_segment_rows
+    blocks = not any(each.run.role == "validate" and len(each.torque) >= least for each in signals)
     segments = _split_runs(signals, blocks, tuning)
-    moving = moving_rows(signals, segments, motion, tuning)
-    return Observed(signals, calm, segments, rate / step, blocks, moving, tuning.min_segment_rows)
+    moving = moving_rows(signals, segments, cutoff_hz, tuning)
+    return Observed(signals, calm, segments, rate_hz, blocks, moving, least)
 
 
 def in_fixed_order(runs: Sequence[Run]) -> list[Run]:
