@@ -41,6 +41,7 @@ class Contact(Term):
     form = "half sine"
     names = ("start", "end", "peak")
     of_time = True
+    of_one_run = True
     run: str = field(default="", kw_only=True)
 
     def columns(self, scene: Scene) -> Array:

@@ -202,7 +202,8 @@ class Candidate(ABC):
     exclude.) identical: effects that no motion separates from this law.
     second_name: another effect has the same columns and is searched for instead; the columns carry its name first.
     names: of its parameters, in the order of `parameters`. size: number of its coefficients. of_time: its columns
-    depend on the order of the samples in time, so single instants do not determine its torque.
+    depend on the order of the samples in time, so single instants do not determine its torque. of_one_run: it happened
+    once in a recording, so a model that is written for others does not hold it.
     looks: number of alternatives from which a scan of the residual chose it, for the correction of p-values.
     """
 
@@ -220,6 +221,7 @@ class Candidate(ABC):
     second_name: bool = False
     names: ClassVar[tuple[str, ...]] = ()
     of_time: bool = False
+    of_one_run: bool = False
     of_channel: bool = False
     looks: int = 1
 

@@ -111,7 +111,10 @@ def model_text(model: TorqueModel, folder: Path) -> str:
 
 
 def model_content(model: TorqueModel, folder: Path) -> dict[str, Any]:
-    """The content of `model.yaml` as it is to stand in a folder."""
+    """The content of `model.yaml` as it is to stand in a folder.
+
+    What belongs to one run, such as a push, is no component of a file: the provenance tells of it.
+    """
     content: dict[str, Any] = {"schema": SCHEMA, "robot": _robot_as_written(model.robot, folder)}
     if model.inertial is not None:
         content |= {"links": [_link_entry(ten) for ten in model.inertial.reshape(-1, 10)]}
@@ -124,7 +127,8 @@ def model_content(model: TorqueModel, folder: Path) -> dict[str, Any]:
         content["motion"] = _motion_entry(model.motion)
     filters = {"cutoff_hz": model.cutoff_hz, "position_factor": model.position_factor}
     factor = {"interval_factor": None if model.covariance is None else model.factor}
-    provenance = {**model.provenance, **filters, **factor}
+    once = [each.candidate.equation(each.coefficients) for each in model.effects if each.candidate.of_one_run]
+    provenance = {**model.provenance, **({"of_one_run": once} if once else {}), **filters, **factor}
     content["provenance"] = {key: value for key, value in provenance.items() if value is not None}
     return content
 
@@ -150,6 +154,7 @@ def _component_entries(model: TorqueModel) -> list[dict[str, Any]]:
             **({"source": "simulation"} if index in model.simulated else {}),
         }
         for index, part in enumerate(model.structure.components)
+        if not part.of_one_run
     ]
 
 

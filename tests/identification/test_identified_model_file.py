@@ -1,3 +1,4 @@
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from shipped_schemas import check_against_schema
 from simulated_arm import arm, motion, run, structure, truth
 
 from armlab.common.errors import InputError
+from armlab.effects.contact import Contact
 from armlab.effects.drive import RotorInertia
 from armlab.effects.friction import Levels, LoadFriction, PowerFriction, ViscousFriction
 from armlab.effects.scene import instants
@@ -147,3 +149,16 @@ def test_a_printed_model_tells_intervals_and_units() -> None:
     assert "viscous_friction, joint 2: coefficient = " in text
     assert "N.m.s/rad" in text
     assert np.char.count(text, "[") > 10
+
+
+def test_what_happened_once_is_no_component_of_a_file(tmp_path: Path) -> None:
+    """A push belongs to one run: a file with it could not be read."""
+    known, push = model(), Contact.at(arm(), 2, shape=(1.0, 2.0))
+    pushed = known.structure.with_components((*known.structure.components, push))
+    saved = replace(known, structure=pushed, values=np.append(known.values, 0.5), covariance=None, stated=())
+    content = yaml.safe_load(saved.save(tmp_path / "model.yaml").read_text())
+    parts = [each.effect for each in known.structure.components]
+    assert [each["effect"] for each in content["components"]] == parts
+    (told,) = content["provenance"]["of_one_run"]
+    assert told.startswith("tau_2 += up to 0.5")
+    assert [each.effect for each in Model.load(tmp_path / "model.yaml").structure.components] == parts
