@@ -73,6 +73,8 @@ def real(
 
     if leave_one_out and (peers is not None or facts is not None or part in ("folders", "pieces")):
         raise InputError(f"--leave-one-out takes public recordings alone: leave out --peers, --facts, --part {part}")
+    if peers is not None and part in ("folders", "pieces"):
+        raise InputError(f"--peers are run on public recordings: leave out --peers or --part {part}")
     if part == "public" and facts is not None:
         raise InputError("--facts are about folders: leave out --facts or --part public")
     if leave_one_out:

@@ -58,11 +58,9 @@ class DataTuning:
     standstill_margin: float = tuned(
         1.5, "how far the filter carries a standstill to both sides", "periods of the cut-off"
     )
-    min_segment_rows: int = tuned(
-        40,
-        "shorter stretches in motion tell too little of the noise, and count where a joint has no others",
-        "rows",
-        least=2,
+    min_segment_rows: int = tuned(40, "shorter stretches in motion tell too little of the noise", "rows", least=2)
+    least_segment_rows: int = tuned(
+        10, "shortest stretch in motion that counts where a joint has no longer ones", "rows", least=2
     )
     min_moving_share: float = tuned(
         0.1, "a joint with fewer moving rows counts as moving all the time", "of the rows", most=1.0

@@ -311,9 +311,9 @@ def local_copies() -> Path | None:
 
 
 def local_recording(name: str) -> Path | None:
-    """A recording folder of this name among the local copies; None where there is none, and for a public recording."""
+    """The recording folder of this name directly below the local copies; None where there is none."""
     folder = local_copies()
-    if folder is None or name in PUBLIC_RECORDINGS or not (folder / name / FILE_NAME).is_file():
+    if folder is None or Path(name).name != name or not (folder / name / FILE_NAME).is_file():
         return None
     return folder / name
 

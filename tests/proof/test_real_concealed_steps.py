@@ -1,6 +1,7 @@
 """Random cases of a real recording in steps of their own: made as files, diagnosed from them, judged by the answers."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from small_reference import reference_in
 
 from armlab.cli.main import main
 from armlab.common.errors import InputError
+from armlab.identification.model_file import read_model
 from armlab.proof.open.real_concealed import at_random
 from armlab.proof.open.real_concealed.at_random import RandomCases, examine_observation, judge_cases, make_cases
 from armlab.proof.open.real_concealed.conceal import ReferenceModel
@@ -19,6 +21,8 @@ from armlab.proof.open.real_concealed.concealed_case import Case, Disturbance, P
 from armlab.proof.open.real_concealed.examine import conceal_case
 from armlab.proof.open.real_concealed.observation import read_observation, write_observation
 from armlab.proof.open.real_identification.looks import LOOKS_FILE
+from armlab.recordings.public import LOCAL_COPIES_VARIABLE
+from problem.robot_file import BUILT_IN_FOLDER
 
 CASES = (
     Case("told"),
@@ -81,6 +85,30 @@ def test_random_cases_are_made_diagnosed_and_judged(tmp_path: Path) -> None:
     assert set(pd.read_csv(tmp_path / "judged" / "cases.csv")["refused"]) == {"no verdict"}
     with pytest.raises(InputError, match="holds no case of staubli-tx40"):
         list(judge_cases(RandomCases(("staubli-tx40",), 1, 1001), made, tmp_path / "judged"))
+
+
+def test_a_folder_of_the_local_copies_is_a_case_with_its_own_robot_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The model that is handed over names the robot file beside it, wherever the command runs."""
+    monkeypatch.setenv(LOCAL_COPIES_VARIABLE, str(tmp_path / "local"))
+    mine = recording_in(tmp_path / "local" / "mine", frame(0, 6), frame(1, 6), robot="robot.yaml")
+    shutil.copy(BUILT_IN_FOLDER / "irb120-arm.yaml", mine / "robot.yaml")
+    settings, made = RandomCases(("mine",), 1, 1001), tmp_path / "made"
+    list(make_cases(settings, tmp_path / "recordings", tmp_path / "results", made, lambda message: None))
+    seen, source = read_observation(made / "observations" / "mine-1")
+    assert source == "mine"
+    assert seen.simulation is not None
+    assert Path(read_model(seen.simulation).robot).resolve() == (made / "observations/mine-1/robot.yaml").resolve()
+
+
+@pytest.mark.parametrize("name", ["emsp", "deep/mine", "none"])
+def test_other_names_are_refused(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A folder has to stand directly below the local copies: its name is that of its cases."""
+    monkeypatch.setenv(LOCAL_COPIES_VARIABLE, str(tmp_path))
+    recording_in(tmp_path / "deep" / "mine", frame(0, 2))
+    with pytest.raises(InputError, match=f"unknown recording '{name}'"):
+        RandomCases((name,), 1, 1001)
 
 
 @pytest.mark.parametrize(

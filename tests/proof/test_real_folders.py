@@ -184,6 +184,7 @@ def test_identify_and_plain_least_squares_are_judged_on_the_same_torque(tmp_path
         (["--part", "public", "--facts", "facts.yaml"], "--facts are about folders"),
         (["--only", "em"], "unknown recording 'em': did you mean 'emps'?"),
         (["--leave-one-out", "--part", "folders"], "--leave-one-out takes public recordings alone"),
+        (["--part", "pieces", "--peers", "python"], "--peers are run on public recordings"),
     ],
 )
 def test_options_that_do_not_fit_are_refused_in_one_line(

@@ -347,7 +347,7 @@ def _has_place_in_simulator(claim: Claim) -> bool:
 def method_text(diagnosis: Diagnosis, held_out_blocks: bool) -> str:
     """How it was done, in a few sentences."""
     held = (
-        "No run of some length was kept for validation, so every third block of time, of up to six a run, was held out."
+        "No run that validates is long enough, so every third block of time was held out, of at most six blocks a run."
         if held_out_blocks
         else "Runs that validate took no part in any fit."
     )

@@ -238,13 +238,10 @@ class Observed:
         return self.of_role("identify", joint) + self.of_role("validate", joint)
 
 
-SHORTER = (1, 2, 4)  # parts of the usual shortest stretch: the longest that every joint has, in each role
-
-
 def observe(runs: Sequence[Run], arm: Arm, inertial: Array | None, settings: Settings) -> Observed:
     """Smooths, differentiates, filters and thins the runs. inertial: (10 * joints,) of the simulated links, if any.
 
-    Where a joint has no stretch in motion of the usual length, shorter ones count.
+    Where a joint has no stretch in motion of the usual length, stretches of half of it count, and of half of that.
     """
     tuning = settings.tuning.data
     even = _to_common_rate([resample_evenly(run) for run in runs])
@@ -254,12 +251,11 @@ def observe(runs: Sequence[Run], arm: Arm, inertial: Array | None, settings: Set
     motion = min(tuning.position_cutoff_ratio * cutoff, tuning.max_position_cutoff_ratio * rate)
     signals = tuple(differentiate(run, cutoff_hz=motion, torque_cutoff_hz=cutoff, step=step) for run in even)
     calm = tuple(_smooth_motion(run, motion) for run in even)
-    rows = tuple(dict.fromkeys(max(tuning.min_segment_rows // share, 1) for share in SHORTER))
-    tried = (
-        _with_segments(signals, calm, motion, rate / step, replace(tuning, min_segment_rows=each)) for each in rows
-    )
-    first = next(tried)
-    return first if not first.short_joints() else next((each for each in tried if not each.short_joints()), first)
+    usual = found = _with_segments(signals, calm, motion, rate / step, tuning)
+    while found.short_joints() and found.min_segment_rows // 2 >= tuning.least_segment_rows:
+        shorter = replace(tuning, min_segment_rows=found.min_segment_rows // 2)
+        found = _with_segments(signals, calm, motion, rate / step, shorter)
+    return usual if found.short_joints() else found
 
 
 def _with_segments(

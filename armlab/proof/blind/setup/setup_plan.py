@@ -11,7 +11,7 @@ from armlab.common.errors import InputError
 from armlab.proof.blind.plan import DEVELOPMENT_SEEDS, Plan, draw_plan, random_stream
 from armlab.proof.blind.setup.mistakes import EFFECTS, Injected, draw_mistake
 from armlab.recordings.load import load_recording
-from armlab.recordings.public import LOCAL_COPIES_VARIABLE, local_copies
+from armlab.recordings.public import LOCAL_COPIES_VARIABLE, local_recording
 from armlab.recordings.recording_file import FILE_NAME
 from problem.arm import Arm
 from problem.robot_file import load_arm
@@ -75,10 +75,10 @@ class SetupCase:
 
 def local_folder(name: str) -> Path:
     """A recording folder with a D-H table among the local copies; InputError where there is none."""
-    local = local_copies()
-    if local is None or not (local / name / FILE_NAME).is_file() or not (local / name / "robot.yaml").is_file():
-        raise InputError(f"no folder {name} with {FILE_NAME} and robot.yaml below {LOCAL_COPIES_VARIABLE}")
-    return local / name
+    folder = local_recording(name)
+    if folder is None or not (folder / "robot.yaml").is_file():
+        raise InputError(f"no folder {name} with {FILE_NAME} and robot.yaml directly below {LOCAL_COPIES_VARIABLE}")
+    return folder
 
 
 def draw_cases(seed: int, simulated: int, real: int, nulls: int, folders: tuple[str, ...] = ()) -> Iterator[SetupCase]:

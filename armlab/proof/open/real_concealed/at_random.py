@@ -40,6 +40,7 @@ from armlab.proof.open.real_identification.looks import LOOKS_FILE, Looks
 from armlab.recordings.load import load_recording
 from armlab.recordings.public import local_recording, open_public_recording
 from armlab.recordings.reading.words import NAMES as MISTAKE_NAMES
+from armlab.recordings.recording import Recording
 from armlab.report.words import effect_in_words
 
 REAL_ARMS = ("emps", "staubli-tx40", "unisa-ur10", "unisa-panda", "kuka-kr300")
@@ -122,15 +123,22 @@ def make_cases(
     looks = Looks(results / LOOKS_FILE)
     for name in settings.recordings:
         progress(f"{name}: the reference model")
-        folder_here = local_recording(name)
-        recording = open_public_recording(name, recordings) if folder_here is None else load_recording(folder_here)
-        reference = identify_reference(recording, recipe_named(name))
+        reference = identify_reference(_open_recording(name, recordings), recipe_named(name))
         yield f"{name}: reference {reference.description}"
         drawn = (DrawnCase(Case(name), 0.0), *draw_cases(reference, settings.seed, settings.cases))
         for number, each in enumerate(drawn):
             write_random_case(reference, number, each, folder)
             for run in reference.recording.with_role("validate"):
                 looks.note(reference.recording.arm.name, run.name, f"concealed: {each.case.name}")
+
+
+def _open_recording(name: str, recordings: Path) -> Recording:
+    """A public recording, or the folder of the local copies that `RandomCases` has found."""
+    if name in REAL_ARMS:
+        return open_public_recording(name, recordings)
+    folder = local_recording(name)
+    assert folder is not None
+    return load_recording(folder)
 
 
 def write_random_case(reference: ReferenceModel, number: int, drawn: DrawnCase, folder: Path) -> None:

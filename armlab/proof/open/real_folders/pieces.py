@@ -1,6 +1,7 @@
 """Pieces of recording folders: both halves of each run, and one of two rows. What is known of the whole judges them.
 
-A piece is a recording that nobody has looked at while a rule was made, though its arm may be known.
+A piece is a recording that nobody has looked at while a rule was made, though its arm may be known. It is cut from the
+files, not from what was read of them, so that import, clock and repairs are judged, too.
 """
 
 import shutil
