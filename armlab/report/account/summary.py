@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armlab.common.report.wording import count_of, format_number, join_words
-from armlab.diagnosis.result import Diagnosis, JointFit
+from armlab.diagnosis.result import Diagnosis, JointFit, JointFriction
 from armlab.diagnosis.torque.names.findings import FRICTION, STATED_SHARE, StatedCause
 from armlab.diagnosis.torque.predict.parts import LINKS, UNKNOWN_CAUSE
 from armlab.effects.library import effect_named
@@ -226,23 +226,30 @@ def cause_place(diagnosis: Diagnosis, cause: StatedCause, own: Sequence[StatedFi
 def friction_sizes(diagnosis: Diagnosis, account: Account, cause: StatedCause) -> tuple[str, ...]:
     """The friction of a cause: of one joint at both speeds, of several the least and the most at their higher speeds.
 
-    Also where friction stands behind play; empty where there is none.
+    Also where friction stands behind play; empty where none is known to be there.
     """
     arm = diagnosis.simulation.arm
     joints = {each.claim.joint for each in account.findings_of(cause) if each.is_friction}
-    own = (each for each in account.friction if each.joint in joints and each.torque[1] > 0)
-    rows = sorted(own, key=lambda each: each.torque[1])  # torque along the motion is no friction
+    own = (each for each in account.friction if each.joint in joints and each.interval[1][0] > 0)
+    rows = sorted(own, key=lambda each: each.torque[1])
     if not rows:
         return ()
     low, high = rows[0], rows[-1]
     if low is high:
         unit = joint_unit(arm, high.joint - 1)
-        pairs = zip(high.torque, high.speeds, strict=True)
-        sizes = [f"{format_number(torque)} {unit} at {format_speed(at, unit)}" for torque, at in pairs]
-        return (join_words(sizes),)
+        pairs = zip(friction_in_words(high, unit), high.speeds, strict=True)
+        return (join_words([f"{size} at {format_speed(at, unit)}" for size, at in pairs]),)
     return tuple(
         f"{format_number(each.torque[1])} {joint_unit(arm, each.joint - 1)} ({joint_in_words(arm, each.joint)})"
         for each in (low, high)
+    )
+
+
+def friction_in_words(friction: JointFriction, unit: str) -> tuple[str, ...]:
+    """Its size at both speeds; its upper bound where it may be none, because no friction drives a joint."""
+    return tuple(
+        f"{format_fixed(size)} {unit}" if low > 0 else f"at most {format_fixed(max(high, 0.0))} {unit}"
+        for size, (low, high) in zip(friction.torque, friction.interval, strict=True)
     )
 
 

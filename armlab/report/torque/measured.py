@@ -14,11 +14,10 @@ from armlab.effects.friction import COULOMB_FACTS, VISCOUS_FACTS
 from armlab.effects.library import effect_named
 from armlab.effects.links import PAYLOAD_FACTS
 from armlab.report.account.account import Account, StatedFinding, account_of
-from armlab.report.account.summary import format_speed
+from armlab.report.account.summary import format_speed, friction_in_words
 from armlab.report.torque.sentences import claim_figures, finding_sentence, number_in_words
 from armlab.report.words import (
     effect_in_words,
-    format_fixed,
     format_measured,
     format_percent,
     is_doubtful,
@@ -71,12 +70,12 @@ def _is_used(rows: Sequence[Sequence[str]], place: int) -> bool:
 
 
 def friction_cell(account: Account, joint: int, arm: Arm) -> str:
-    """`2.10 N m at 0.10 rad/s, 3.40 N m at 1.0 rad/s`."""
+    """`2.10 N m at 0.10 rad/s, 3.40 N m at 1.0 rad/s`, or `at most 0.30 N m`."""
     row = account.friction_of(joint)
     if row is None:
         return NOTHING
     unit = joint_unit(arm, joint - 1)
-    low, high = (_together(f"{format_fixed(size)} {unit}") for size in row.torque)
+    low, high = map(_together, friction_in_words(row, unit))
     first, last = (_together(f"{format_speed(speed, unit)}") for speed in row.speeds)
     return f"{low} at {first}, {high} at {last}"
 
