@@ -1,6 +1,6 @@
 """From what is believed in the end to a diagnosis: claims, the model that is delivered, and what each part explains."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -213,7 +213,7 @@ def _assemble(
         claims=claims,
         parts=parts,
         is_plain=is_plain_best,
-        friction=joint_friction(replace(held, state=with_usual(held, model.state.groups))),
+        friction=joint_friction(replace(held, state=with_usual(held, _beside_friction(model, named)))),
         located=locate_excess(start, floor, observed, tuning) if claims else (),
         unexplained=tuple(
             Unexplained(each.joint + 1, float(np.clip(each.share, 0, 1)), each.depends_on) for each in remains
@@ -226,6 +226,18 @@ def _assemble(
         unnamed=unnamed,
         left=_shares_left(found, prediction.judged),
     )
+
+
+def _beside_friction(model: FittedModel, claimed: Collection[int]) -> tuple[int, ...]:
+    """The effects of a model beside which friction is measured.
+
+    What follows a velocity, is no friction, and is not claimed would take the place of friction.
+    """
+    facts = {group: model.candidate(group).facts for group in model.state.groups}
+    takes = {
+        group for group, each in facts.items() if each.axis == "velocity" and not model.candidate(group).is_friction
+    }
+    return tuple(group for group in model.state.groups if group in claimed or group not in takes)
 
 
 def _shares_left(model: TorqueModel, observed: Observed) -> dict[Role, float]:
