@@ -15,7 +15,6 @@ from armlab.common.tuning import TuningValue, tuned
 from armlab.diagnosis.motion.motion_tuning import MotionTuning
 from armlab.recordings.reading.tuning import ReadingTuning
 
-EVIDENCE_SOURCE = "fourth judged set: a quarter of the names below it were wrong in the clean tier"
 REFUTE_SOURCE = "development sets: wrong names left 0.2 to 9 times what they explained, right ones 0.53 at most"
 
 
@@ -197,7 +196,6 @@ class BlockTuning:
 class PredictionTuning:
     """The model that predicts: its cut-off, and what it holds beside the named effects."""
 
-    folds: int = tuned(6, "blocks of time of the identification runs, held out in turn", "blocks", least=2)
     min_trial_gain: float = tuned(
         0.02,
         "a lower cut-off, or links near a robot file, have to lower the error by more",
@@ -231,23 +229,11 @@ class PredictionTuning:
 
 
 @dataclass(frozen=True)
-class EvidenceTuning:
-    """The evidence for each effect."""
+class PushTuning:
+    """What a push looks like."""
 
-    block_s: float = tuned(1.0, "length of the stretches of time that are compared", "s", least=1e-3)
-    min_blocks: int = tuned(12, "least number of these stretches", "stretches", least=2)
-    push_level: float = tuned(0.3, "rows above it belong to the push", "of a push's peak", most=0.99)
-    min_push_s: float = tuned(0.15, "a push that is shorter in motion is a reversal", "s")
-    min_push_moving_share: float = tuned(
-        0.5, "part of a push in which the joint has to move", "of the push's rows", most=1.0
-    )
-    max_extreme_share: float = tuned(
-        0.5,
-        "part of a push in which position, speed or torque may be beyond all other stretches",
-        "of the push's rows",
-        most=1.0,
-    )
-    max_loss: float = tuned(0.002, "growth that an effect may cause", "of the error of validation runs")
+    level: float = tuned(0.3, "rows above it belong to the push", "of its peak", most=0.99)
+    least_s: float = tuned(0.15, "a push that is shorter in motion is a reversal", "s")
 
 
 @dataclass(frozen=True)
@@ -256,28 +242,6 @@ class PruningTuning:
 
     level: float = tuned(
         0.01, "chance of any false claim on a recording with nothing missing", "probability", least=1e-12, most=1.0
-    )
-    least_gain: float = tuned(
-        0.03,
-        "gain that a claim has to make on held-out data",
-        "of the joint's held-out error",
-        source="development sets: of 30 right findings above two detection limits 29 gained more, wrong ones 2 to 3 %",
-    )
-    least_evidence: float = tuned(
-        60.0,
-        "what a name adds to the log evidence: below, laws that resemble one another are confused",
-        "log likelihood",
-        source=EVIDENCE_SOURCE,
-    )
-    self_evident_gain: float = tuned(
-        0.25, "gain that needs no other evidence for its name", "of the joint's held-out error"
-    )
-    held_out_level: float = tuned(
-        0.2,
-        "level of the test that stretches of time share a held-out gain",
-        "one-sided p-value",
-        source="a collaborative arm: without it couplings take the place of friction, 0.05 loses one",
-        most=1.0,
     )
     max_cycles: int = tuned(3, "cycles of withdrawing and looking again", "cycles", least=1)
 
@@ -293,7 +257,12 @@ class SurrogateTuning:
         least=-12.0,
         most=12.0,
     )
-    fold_s: float = tuned(2.0, "length of the stretches that choose the ridge in turn", "s", least=1e-3)
+    fold_s: float = tuned(
+        2.0,
+        "length of stretches that choose the ridge in turn, and of those whose errors are tied",
+        "s",
+        least=1e-3,
+    )
     block_s: float = tuned(0.5, "length of the stretches that are compared on held-out data", "s", least=1e-3)
     min_blocks: int = tuned(12, "least number of these stretches", "stretches", least=3)
     hats: int = tuned(8, "piecewise linear functions of a variable", "functions", least=3)
@@ -337,8 +306,11 @@ class SurrogateTuning:
     noise_level: float = tuned(
         0.05, "below it a prediction counts as no noise: else whitening would hide what is slow", "p-value", most=1.0
     )
-    min_structure_gain: float = tuned(
-        0.03, "gain of structure: less may be what known effects are known too little of", "of the held-out error"
+    least_gain: float = tuned(
+        0.03,
+        "gain that a finding has to make, a name or structure without one",
+        "of the joint's held-out error",
+        source="development sets: of 30 right findings above two detection limits 29 gained more, wrong ones 2 to 3 %",
     )
     min_variable_share: float = tuned(
         0.1, "part of the gain that is lost without an important variable", "of the gain", most=1.0
@@ -356,18 +328,17 @@ class LocationTuning:
     min_significance: float = tuned(
         2.0, "excess error of a joint that is more than chance", "standard errors times sqrt(log(stretches + 1))"
     )
-    min_share: float = tuned(
-        0.5,
-        "bins with more of it are the regime, runs are affected, a stretch is named by its time",
-        "of the worst bin's or run's excess, or of all excess",
-        most=0.99,
-    )
 
 
 @dataclass(frozen=True)
 class UnknownTuning:
     """When structure that is left is a finding."""
 
+    unclaimed_fall: float = tuned(
+        0.25,
+        "fall by parts that no finding claims, with which it is inconclusive to find none",
+        "of the held-out error",
+    )
     level: float = tuned(
         0.03, "level of structure without a name, after all surrogates that were tried", "p-value", most=1.0
     )
@@ -376,18 +347,6 @@ class UnknownTuning:
         "structure below it comes from the form of the law, and is no finding",
         "of the error that a law explains",
         source=REFUTE_SOURCE,
-    )
-    min_curve_share: float = tuned(
-        0.5,
-        "what a friction curve has to explain of structure that depends on the joint's own velocity alone",
-        "of the error that a surrogate explains",
-        most=1.0,
-    )
-    min_curve_error: float = tuned(
-        0.5,
-        "structure of the velocity alone that is more asks for a friction curve, whatever formula stands there",
-        "of what is left at a joint",
-        source="set after a look at the UR10",
     )
 
 
@@ -427,16 +386,6 @@ class NamingTuning:
     )
     shown: float = tuned(0.05, "a less probable name is not listed", "probability", most=1.0)
     names: int = tuned(8, "the likeliest effects that are weighed for a finding", "names", least=1)
-    max_independent: float = tuned(
-        0.5,
-        "what a law keeps beside a finding in whose place it would stand; with more it is another effect",
-        "of the log evidence",
-        most=1.0,
-    )
-    least_addition: float = tuned(
-        8.0, "what an effect adds that is weighed beside names that passed all tests", "log evidence"
-    )
-    max_additions: int = tuned(4, "that are weighed beside names that passed all tests", "effects")
 
 
 @dataclass(frozen=True)
@@ -448,12 +397,6 @@ class PlausibilityTuning:
         "highest over lowest end of the interval of a positive parameter that is known",
         source="development sets: 12 for a right finding; an interval of 94 % of the value to both sides has it",
         least=1.0,
-    )
-    max_unknown_share: float = tuned(
-        0.5,
-        "what structure without a name could be of a link or load that is known",
-        "of the torque of the link or load",
-        source="convention: a load of which half may be something else is not known",
     )
 
 
@@ -547,7 +490,7 @@ class Tuning:
     refine: RefineTuning = RefineTuning()
     blocks: BlockTuning = BlockTuning()
     prediction: PredictionTuning = PredictionTuning()
-    evidence: EvidenceTuning = EvidenceTuning()
+    pushes: PushTuning = PushTuning()
     pruning: PruningTuning = PruningTuning()
     surrogate: SurrogateTuning = SurrogateTuning()
     location: LocationTuning = LocationTuning()

@@ -9,10 +9,11 @@ import engine_cases as cases
 import numpy as np
 import pytest
 
-from armlab.diagnosis.result import Claim, Member, Part, Removal
+from armlab.diagnosis.result import Claim, JointFriction, Member, Part, Removal
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.columns.design import DesignMatrix
 from armlab.diagnosis.torque.columns.solver import State
+from armlab.diagnosis.torque.conclude import _beside_friction
 from armlab.diagnosis.torque.diagnose import prepare
 from armlab.diagnosis.torque.names.findings import (
     Statement,
@@ -36,7 +37,7 @@ from armlab.diagnosis.torque.rows.data import Segment
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_background
 from armlab.effects.contract import UNKNOWN, Effect
 from armlab.effects.library import effect_named, library
-from armlab.report.account.summary import format_speed, list_while_short
+from armlab.report.account.summary import format_speed, friction_in_words, list_while_short
 
 MISSED = Removal(0, growth=0.5, rms=1.0, torque=10.0, joints=(0, 1))
 HARDLY = Removal(0, growth=0.04, rms=1.0, torque=1.0)
@@ -196,6 +197,21 @@ def test_a_joint_without_torque_counts_in_units_of_the_largest() -> None:
     torque = np.array([[3.0, 0.0], [-3.0, 1e-12]])
     observed: Any = SimpleNamespace(joints=2, torque=torque, rows_held_out=lambda joint: np.array([True, True]))
     assert _rows_and_units(observed)[1].tolist() == [3.0, 3.0]
+
+
+def test_friction_that_may_be_none_is_told_by_its_upper_bound() -> None:
+    row = JointFriction(1, (0.1, 1.0), (-0.3, 2.1), ((-0.9, 0.3), (1.6, 2.6)))
+    assert friction_in_words(row, "N m") == ("at most 0.300 N m", "2.10 N m")
+
+
+@pytest.mark.parametrize(("claimed", "kept"), [((), (0, 2, 3)), ((1,), (0, 1, 2, 3))])
+def test_no_unclaimed_law_of_velocity_stands_beside_friction(claimed: tuple[int, ...], kept: tuple[int, ...]) -> None:
+    """Here a coupling; a spring and laws of friction stay."""
+    effects = ("coulomb_friction", "joint_coupling", "cable_stiffness", "presliding_hysteresis")
+    facts = [effect_named(each) for each in effects]
+    candidates = [SimpleNamespace(facts=each, is_friction=each.cause == "friction") for each in facts]
+    model: Any = SimpleNamespace(state=SimpleNamespace(groups=(0, 1, 2, 3)), candidate=candidates.__getitem__)
+    assert _beside_friction(model, claimed) == kept
 
 
 def test_friction_is_told_at_speeds_of_the_motion_though_the_joint_rests_for_most_of_the_time(

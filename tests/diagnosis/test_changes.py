@@ -296,7 +296,7 @@ def test_the_friction_that_differs_between_two_runs_is_what_constant_speed_shows
     (named,) = found.findings
     changes = {each.parameter: np.array(each.interval) for each in named.changes}
     sides = ("positive", "negative")
-    assert set(sides) <= set(changes) <= {"level", *sides, *(f"{side}_slope" for side in sides)}
+    assert set(changes) <= {"level", "coefficient", *sides, *(f"{side}_slope" for side in sides)}
     forces, speeds = [], []
     for run in whole.runs:
         step = float(np.median(np.diff(run.time)))
@@ -304,11 +304,13 @@ def test_the_friction_that_differs_between_two_runs_is_what_constant_speed_shows
         steady = (np.abs(speed) > 0.08) & (np.abs(acceleration) < 0.03)
         forces.append(np.mean(np.sign(speed[steady]) * run.torque[steady, 0]))
         speeds.append(np.mean(np.abs(speed[steady])))
-    both = (changes["positive"] + changes["negative"]) / 2
-    if "positive_slope" in changes:
-        level, slopes = both, (changes["positive_slope"] + changes["negative_slope"]) / 2
-    else:
-        level, slopes = changes.get("level", np.zeros(2)), both
+    level, slopes = (changes.get(name, np.zeros(2)) for name in ("level", "coefficient"))
+    if "positive" in changes:
+        both = (changes["positive"] + changes["negative"]) / 2
+        if "positive_slope" in changes:
+            level, slopes = both, (changes["positive_slope"] + changes["negative_slope"]) / 2
+        else:
+            slopes = both
     low, high = level + slopes * np.mean(speeds)
     assert low < forces[1] - forces[0] < high
 

@@ -32,7 +32,7 @@ def _told(found: Diagnosis) -> list[tuple[str, int | None, str]]:
     return [(each.effect, each.joint, each.equation) for each in found.claims]
 
 
-LATE, EARLY = "pruning.least_gain=1e9", "data.rows_per_cutoff=3"  # used after the search, and before it
+LATE, EARLY = "pruning.level=1e-12", "data.rows_per_cutoff=3"  # used after the search, and before it
 
 
 def test_each_guard_is_off_once_and_no_stage_before_its_own_is_done_again(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -47,10 +47,8 @@ def test_a_sure_effect_passes_and_each_failed_test_has_its_value_and_its_bound()
     assert first_failed_test(SURE, settings) is None
     failing = {
         "significance": (replace(SURE, corrected=0.5), 0.5, tuning.level),
-        "log evidence": (replace(SURE, score=1.0, gain=0.0), 1.0, tuning.least_evidence),
-        "held-out gain": (replace(SURE, gain=0.0), 0.0, tuning.least_gain),
-        "p of the held-out gain": (replace(SURE, held_p=0.5), 0.5, tuning.held_out_level),
-        "error of validation runs": (replace(SURE, rms_after=1.5), 0.5, settings.tuning.evidence.max_loss),
+        "held-out gain": (replace(SURE, gain=0.0), 0.0, settings.tuning.surrogate.least_gain),
+        "error of validation runs": (replace(SURE, rms_after=1.5), 0.5, 0.0),
     }
     for name, (evidence, value, bound) in failing.items():
         failed = first_failed_test(evidence, settings)
@@ -91,7 +89,7 @@ def test_a_finding_and_an_effect_that_no_search_takes_are_answered(found: Diagno
 
 
 def test_the_last_test_that_failed_is_the_answer_with_its_numbers(found: Diagnosis) -> None:
-    failed = FailedTest("held-out gain", "held-out gain 1.2 %", 0.012, 0.03, "pruning.least_gain")
+    failed = FailedTest("held-out gain", "held-out gain 1.2 %", 0.012, 0.03, "surrogate.least_gain")
     steps = (
         Step("+ backlash 3 (0.1,)", 5.0),
         Step("withdrawn: backlash 3: p = 0.5 after correction", 0.0, FailedTest("significance", "p = 0.5", 0.5, 0.01)),
@@ -102,7 +100,7 @@ def test_the_last_test_that_failed_is_the_answer_with_its_numbers(found: Diagnos
     assert lines[0].startswith(
         "why backlash at joint 3: not named: held-out gain is 0.012, and has to be at least 0.03 "
     )
-    assert lines[0].endswith("(pruning.least_gain)")
+    assert lines[0].endswith("(surrogate.least_gain)")
     assert lines[1:] == [f"  {each.what}" for each in steps[:3]]
 
 

@@ -65,7 +65,7 @@ def confirm_in_calm_windows(
 def is_refuted(calm: Windows, found: Array, fewer: Array, tuning: MotionTuning = DEFAULT) -> bool:
     """Whether numbers, (parameters,), explain less of the motion in calm windows than is possible if they are true.
 
-    Within as many standard errors as a replay is clearly worse by.
+    Less than half of it, half way from false to true, within as many standard errors as a replay is clearly worse by.
 
     fewer: those that calm windows confirm, the others as in the simulation.
     """
@@ -75,4 +75,4 @@ def is_refuted(calm: Windows, found: Array, fewer: Array, tuning: MotionTuning =
     if size == 0:
         return False
     variance = float(correlated_variances(change[:, None], without, calm.window, calm.encoder_noise)[0])
-    return bool(float(change @ without) / size + tuning.clearly_worse * variance**0.5 / size < tuning.least_confirmed)
+    return bool(float(change @ without) / size + tuning.clearly_worse * variance**0.5 / size < 1 / 2)

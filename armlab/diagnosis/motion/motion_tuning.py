@@ -144,13 +144,6 @@ class MotionTuning:
         most=1.0,
     )
     min_calm_windows: int = tuned(4, "calm ones that can refute a number", "windows", least=2)
-    least_confirmed: float = tuned(
-        0.5,
-        "that it has to explain in calm windows, within two standard errors: half way from false to true",
-        "of what a number explains where a limit acts",
-        source="convention",
-        most=1.0,
-    )
     odd_factor: float = tuned(
         4.0, "a window that something else than the servo has moved", "times the median error", least=1.0
     )

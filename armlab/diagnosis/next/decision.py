@@ -96,7 +96,7 @@ def required_held_out_gain(right: Law, other: Law, rows: float) -> float:
     It stands for the share of held-out error by which a diagnosis wants such a law to be better.
     """
     if other.candidate.facts.usual and other.candidate.effect in right.candidate.facts.contains:
-        return 0.5 * Settings().tuning.pruning.least_gain * rows * right.share
+        return 0.5 * Settings().tuning.surrogate.least_gain * rows * right.share
     return -np.inf
 
 

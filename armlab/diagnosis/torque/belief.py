@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from armlab.diagnosis.result import Claim, Weighed
+from armlab.diagnosis.result import Weighed
 from armlab.diagnosis.torque.columns.solver import State
 from armlab.diagnosis.torque.evidence.evidence import Evidence
 from armlab.diagnosis.torque.predict.prediction import Prediction
@@ -19,9 +19,8 @@ class Belief:
 
     effects, links: the evidence for names that hold, by group and by link (from 0); present: for effects of the model
     that are not claimed. banned: groups for which a search does not look any more. left: structure that the model
-    leaves at each joint. weighed: names of the effects that were added because they are probable, and of friction
-    whose law has no believable numbers, by group; unnamed: findings without a probable name; nothing: names of what may
-    be nothing. prediction: the model that predicts, None before it is fitted.
+    leaves at each joint. weighed: names of friction whose law has no believable numbers, by group. prediction: the
+    model that predicts, None before it is fitted.
     """
 
     model: FittedModel
@@ -31,8 +30,6 @@ class Belief:
     banned: frozenset[int] = frozenset()
     left: tuple[Structure, ...] = ()
     weighed: Mapping[int, Weighed] = field(default_factory=dict)
-    unnamed: tuple[Claim, ...] = ()
-    nothing: tuple[Weighed, ...] = ()
     prediction: Prediction | None = None
 
     @property

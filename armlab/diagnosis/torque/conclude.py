@@ -58,7 +58,7 @@ from armlab.diagnosis.torque.search.fitted_model import (
 )
 from armlab.diagnosis.torque.search.search import Search
 from armlab.diagnosis.torque.search.surrogate import Structure
-from armlab.diagnosis.tuning import PruningTuning, changed_numbers
+from armlab.diagnosis.tuning import UnknownTuning, changed_numbers
 from armlab.effects.contract import UNKNOWN
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.recording import ROLES, Recording, Role
@@ -87,7 +87,7 @@ def name_claims(belief: Belief) -> NamedClaims:
     explained = {group: each for group, each in belief.effects.items() if group not in nameless} | dict(belief.present)
     unknowns = [each for each in remains if not is_form_error(each, explained, belief.tuning.unknown)]
     model, claims = _claims_of(belief, names, remains, unknowns)
-    weighed = (*(claim.weighed for claim in claims), *belief.nothing)
+    weighed = tuple(claim.weighed for claim in claims)
     plain = model.design.simulation.joints_without_friction
     named = named_claims(claims, settings, plain)
     model = replace(model, steps=(*model.steps, *lost_names(claims, named, settings)))
@@ -123,8 +123,7 @@ def _claims_of(
     told, claims = links_that_data_tell(model, claims, remains)
     residual = model.residual(model.fit)
     structures = (make_unknown_claim(told, each, residual, weigh_structure(told, each, effects)) for each in unknowns)
-    unnamed = (_without_prediction_of(each, unknowns) for each in belief.unnamed)
-    return told, (*claims, *structures, *unnamed)
+    return told, (*claims, *structures)
 
 
 def links_in_doubt(names: FittedModel, model: FittedModel, claims: Sequence[Claim]) -> Iterator[Claim]:
@@ -140,12 +139,6 @@ def links_in_doubt(names: FittedModel, model: FittedModel, claims: Sequence[Clai
         together = next(part for part in weigh_parts(model, off[:1]) if part.cause == LINKS and part.joint is None)
         if together.removal is not None and not together.removal.is_minor:
             yield max(weigh_claims(model, off), key=lambda each: each.removal.growth if each.removal else 0.0)
-
-
-def _without_prediction_of(claim: Claim, unknowns: Sequence[Structure]) -> Claim:
-    """An unnamed claim beside structure that is a finding, too: at one joint, the structure holds what it predicts."""
-    same = any(each.joint + 1 == claim.joint for each in unknowns)
-    return replace(claim, prediction=np.zeros_like(claim.prediction), left_out=0.0) if same else claim
 
 
 def _assemble(
@@ -193,7 +186,7 @@ def _assemble(
         for each in claims
     )
     claims = with_minor_ones(claims, parts)
-    unnamed = _unnamed_gain(fits, tuning.pruning) if not claims else None
+    unnamed = _unnamed_gain(fits, tuning.unknown) if not claims else None
     status: Status = "mismatch" if claims else "none" if unnamed is None else "inconclusive"
     base, covariance = prediction.model.base_parameters()
     held = fit_with_prior(design, model.noise, model.state.widths)
@@ -251,10 +244,10 @@ def _shares_left(model: TorqueModel, observed: Observed) -> dict[Role, float]:
     return out
 
 
-def _unnamed_gain(fits: Sequence[JointFit], tuning: PruningTuning) -> JointFit | None:
+def _unnamed_gain(fits: Sequence[JointFit], tuning: UnknownTuning) -> JointFit | None:
     """The joint whose held-out error falls most with parts that are present and not claimed, where that is much."""
     worst = min(fits, key=lambda each: each.after / max(each.before, 1e-300))
-    return worst if worst.after < (1 - tuning.self_evident_gain) * worst.before else None
+    return worst if worst.after < (1 - tuning.unclaimed_fall) * worst.before else None
 
 
 def _is_beaten_by(plain: Yardstick, prediction: Prediction) -> bool:

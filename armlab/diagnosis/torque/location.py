@@ -54,7 +54,7 @@ def locate_excess(residual: Array, floor: Array, observed: Observed, tuning: Tun
 
 def _significant_excess(power: Array, rate_hz: float, tuning: Tuning) -> float:
     """Mean excess power, zero where it may be chance: tested between stretches of time, errors being tied."""
-    stretches = max(int(len(power) / rate_hz / tuning.evidence.block_s), tuning.evidence.min_blocks)
+    stretches = max(int(len(power) / rate_hz / tuning.surrogate.fold_s), tuning.surrogate.min_blocks)
     means = np.array([part.mean() for part in np.array_split(power, stretches)])
     error = float(np.std(means, ddof=1) / np.sqrt(stretches))
     mean = float(power.mean())
@@ -81,14 +81,14 @@ def _joint_variables(joint: int, observed: Observed) -> dict[str, Array]:
 
 
 def _best_regime(power: Array, values: Array, tuning: Tuning) -> tuple[float, str]:
-    """Share of the excess error's scatter that a variable orders, and the regime with most of it."""
+    """Share of the excess error's scatter that a variable orders, and the regime with more than half of its peak."""
     count = tuning.location.bins
     edges = np.quantile(values, np.linspace(0, 1, count + 1))
     bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, count - 1)
     counts = np.bincount(bins, minlength=count)
     means = np.bincount(bins, power, count) / np.maximum(counts, 1)
     ordered = float(np.average((means - power.mean()) ** 2, weights=counts)) / max(float(np.var(power)), 1e-300)
-    high = np.flatnonzero(means > tuning.location.min_share * means.max())
+    high = np.flatnonzero(means > means.max() / 2)
     if len(high) >= count - 1:
         return ordered, "over its whole range"
     spans = np.split(high, np.flatnonzero(np.diff(high) > 1) + 1)
@@ -97,23 +97,23 @@ def _best_regime(power: Array, values: Array, tuning: Tuning) -> tuple[float, st
 
 
 def _affected_runs(power: Array, observed: Observed, tuning: Tuning) -> tuple[str, ...]:
-    """Runs with a large part of the excess of the worst one."""
+    """Runs with more than half of the excess of the worst one."""
     means: dict[str, float] = {}
     for index, name in enumerate(observed.names):
         parts = [power[each.start : each.stop] for each in observed.segments if each.run == index]
         means[name] = float(np.mean(np.concatenate(parts)))
     worst = max(means.values())
-    return tuple(name for name, mean in means.items() if mean > tuning.location.min_share * worst)
+    return tuple(name for name, mean in means.items() if mean > worst / 2)
 
 
 def _peak_stretch(power: Array, observed: Observed, tuning: Tuning) -> tuple[float, float] | None:
-    """The short stretch of a run that holds a large part of all excess error; None where there is none."""
+    """The short stretch of a run that holds most of all excess error; None where there is none."""
     total = float(np.sum(np.maximum(power, 0)))
     for each in observed.segments:
         part = np.maximum(power[each.start : each.stop], 0)
         width = max(len(part) // tuning.location.bins, 1)
         sums = np.convolve(part, np.ones(width), mode="valid")
-        if total > 0 and sums.max() > tuning.location.min_share * total:
+        if total > 0 and sums.max() > total / 2:
             start = observed.time[each.start + int(np.argmax(sums))]
             return float(start), float(start + width / observed.rate_hz)
     return None

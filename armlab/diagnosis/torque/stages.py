@@ -17,8 +17,8 @@ from armlab.diagnosis.torque.evidence.friction_curves import name_friction_curve
 from armlab.diagnosis.torque.evidence.plausibility import unclaim_implausible
 from armlab.diagnosis.torque.evidence.pruning import prefer_one_body, prune, scan_what_is_left
 from armlab.diagnosis.torque.evidence.unknown import with_what_is_left
-from armlab.diagnosis.torque.names.additions import add_probable, with_likeliest_names
 from armlab.diagnosis.torque.names.expected_parts import claim_expected_parts
+from armlab.diagnosis.torque.names.likeliest_names import with_likeliest_names
 from armlab.diagnosis.torque.predict.prediction import fit_prediction
 from armlab.diagnosis.torque.search.fitted_model import Progress, fit_background, search_effects
 from armlab.effects.library import library
@@ -62,10 +62,6 @@ BY_PROBABILITY = (
         with_likeliest_names,
         "Each effect takes the likeliest name of its finding, by learnt weights.",
         "weighing names",
-    ),
-    Stage(
-        add_probable,
-        "What would still raise the log evidence, and has a probable name, is added, though a test failed it.",
     ),
     Stage(
         choose_prediction,

@@ -70,7 +70,7 @@ def _simulations(
         rng = np.random.default_rng([seed, number])
         gone = rng.permutation(len(named))[: (len(named) + 1) // 2] if number >= repetitions else ()
         torque = sum((named[each].prediction for each in gone), np.zeros_like(left))
-        drawn = _drawn_anew(left, design.observed, model.design.settings.tuning.evidence.block_s, rng)
+        drawn = _drawn_anew(left, design.observed, model.design.settings.tuning.surrogate.fold_s, rng)
         without = frozenset((named[each].effect, named[each].joint) for each in gone)
         yield _Simulated(design.target - left - torque + drawn, without)
 

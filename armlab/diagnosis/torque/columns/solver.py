@@ -78,7 +78,6 @@ class Solver:
     places: number of places that are looked at, the factor of the correction. scales: of each group's coefficients.
     simulated: the coefficients that the simulation has of each group's law already, to which what is fitted adds.
     expected: numbers of usual friction of joints of whose friction the simulation says nothing.
-    flexible_gains: what surrogates explain of states at joints, kept for who asks again (`flexible_gain`).
     """
 
     def __init__(
@@ -99,7 +98,6 @@ class Solver:
         self._links: dict[Widths | None, LinkColumns] = {}
         self._fits: dict[State, Fit] = {}  # those that were asked for last
         self._held: dict[State, Fit] = {}
-        self.flexible_gains: dict[tuple[State, int], float] = {}
         self._rests: tuple[State, dict[int, tuple[Array, Array]]] | None = None  # of the state that was asked for last
         self._contained: dict[int, tuple[int, ...]] = {}
 
@@ -222,7 +220,6 @@ class Solver:
 
         Scores and covariances are those of the free fit, the chi-square that of these coefficients.
         """
-        self.flexible_gains.clear()
         free, gram = self.free_fit(state), self.moments.gram
         chi_square = float(2 * coefficients @ gram[:-1, -1] - coefficients @ gram[:-1, :-1] @ coefficients)
         score = free.score - max(free.chi_square - chi_square, 0.0) / 2

@@ -23,7 +23,8 @@ from armlab.diagnosis.torque.evidence.pushes import make_stretch, reason_no_cont
 from armlab.diagnosis.torque.rows.data import rows_in
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_values, split_fit
 from armlab.diagnosis.torque.search.refine import profile_without
-from armlab.diagnosis.tuning import EvidenceTuning
+
+SMALLEST_CHANGE = 1e-4  # of a held-out error: less changes nothing that is shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +103,7 @@ class StatesCompared:
         observed, noise = self.model.design.observed, self.model.noise
         left = np.column_stack([self.model.residual_at(joint, each) for each in (less, fit)])
         white = noise.white(left, joint, observed, "validate")
-        tuning = self.model.design.settings.tuning.evidence
+        tuning = self.model.design.settings.tuning.surrogate
         stretches = block_numbers(observed, tuning.block_s, tuning.min_blocks)
         blocks = noise.numbers(stretches, joint, observed, "validate")
         return held_out_gain(white[:, 0], white[:, 1], blocks)
@@ -142,9 +143,10 @@ class Evidence:
         """By what share the RMS on validation rows falls."""
         return 1 - self.rms_after / self.rms_before if self.rms_before > 0 else 0.0
 
-    def is_refuted(self, tuning: EvidenceTuning) -> bool:
-        """Whether the error on validation rows grows by more than the allowed loss."""
-        return self.fall < -tuning.max_loss
+    @property
+    def is_refuted(self) -> bool:
+        """Whether the error on validation rows grows."""
+        return self.fall < -SMALLEST_CHANGE
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,11 +155,6 @@ class Judge:
 
     model: FittedModel
     state: State
-
-    @property
-    def tuning(self) -> EvidenceTuning:
-        """Bounds of the evidence."""
-        return self.model.design.settings.tuning.evidence
 
     @cached_property
     def compared(self) -> StatesCompared:

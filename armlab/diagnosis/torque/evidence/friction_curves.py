@@ -30,7 +30,7 @@ def name_friction_curves(belief: Belief) -> Belief:
         own = (f"velocity_{each.joint + 1}",)
         if each.depends_on != own or not is_structured(each, tuning):
             continue
-        if is_form_error(each, effects, tuning.unknown) and predicted_share(each) < tuning.unknown.min_curve_error:
+        if is_form_error(each, effects, tuning.unknown) and predicted_share(each) < 1 / 2:
             continue
         state = _likeliest_curve(model, each.joint + 1)
         if state is None:
@@ -40,7 +40,7 @@ def name_friction_curves(belief: Belief) -> Belief:
         evidence = unknown_evidence(model, each, before, after)
         by_surrogate = unknown_evidence(model, each, before, before - each.prediction)
         explained, wanted = (found.rms_before**2 - found.rms_after**2 for found in (evidence, by_surrogate))
-        if explained <= tuning.unknown.min_curve_share * wanted:
+        if explained <= wanted / 2:
             continue
         (group,) = set(state.groups) - set(model.state.groups)
         kept = {number: known for number, known in effects.items() if number in state.groups}

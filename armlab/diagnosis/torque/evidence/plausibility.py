@@ -114,7 +114,7 @@ def reason_link_unknown(claim: Claim, left: Sequence[Structure], noise: Array, t
     """
     if claim.candidate is None or claim.candidate.facts.where != "link":
         return None
-    if claim.in_links and claim.evidence.score < tuning.pruning.least_evidence and not _differs_from_zero(claim):
+    if claim.in_links and not _differs_from_zero(claim):
         return "no parameter differs from zero"
     felt, link = np.std(claim.prediction, axis=0) / noise, claim.candidate.joints[0]
     for each in left:
@@ -124,7 +124,7 @@ def reason_link_unknown(claim: Claim, left: Sequence[Structure], noise: Array, t
             return f"what is left without a name at joint {each.joint + 1} may be of a body that a later link carries"
         unnamed = float(np.std(each.prediction) / noise[each.joint])
         share = float(unnamed * felt[each.joint] / (felt @ felt))
-        if share > tuning.plausibility.max_unknown_share:
+        if share > 1 / 2:
             return f"what is left without a name at joint {each.joint + 1} could be {share:.0%} of it"
     return None
 

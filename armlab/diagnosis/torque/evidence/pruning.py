@@ -23,30 +23,19 @@ from armlab.diagnosis.torque.search.search import FailedTest, Search, Step
 
 def first_failed_test(evidence: Evidence, settings: Settings) -> FailedTest | None:
     """The first test that an effect does not pass; None where it may be claimed."""
-    guards, tuning = settings.guards, settings.tuning.pruning
+    guards, p_value = settings.guards, evidence.corrected
+    level, least = settings.tuning.pruning.level, settings.tuning.surrogate.least_gain
     if guards.physics_signs and evidence.objection is not None:
         return FailedTest("laws of physics", evidence.objection)
-    p_value, score, gain = evidence.corrected, evidence.score, evidence.gain
-    if p_value > tuning.level:
+    if p_value > level:
         text = f"p = {p_value:.2g} after correction"
-        return FailedTest("significance", text, p_value, tuning.level, "pruning.level", at_least=False)
-    if not evidence.usual and score < tuning.least_evidence and gain < tuning.self_evident_gain:
-        text = f"log evidence {score:.0f}, too little for a name of {100 * gain:.3g} % held-out gain"
-        return FailedTest("log evidence", text, score, tuning.least_evidence, "pruning.least_evidence")
-    if guards.heldout_gain and gain < tuning.least_gain:
-        text = f"held-out gain {100 * gain:.3g} %"
-        return FailedTest("held-out gain", text, gain, tuning.least_gain, "pruning.least_gain")
-    if not guards.heldout_gain or not evidence.repeatable:
-        return None
-    if not evidence.usual and evidence.held_p > tuning.held_out_level:
-        text, level = f"held-out gain not sure (p = {evidence.held_p:.2g})", tuning.held_out_level
-        return FailedTest(
-            "p of the held-out gain", text, evidence.held_p, level, "pruning.held_out_level", at_least=False
-        )
-    if evidence.is_refuted(settings.tuning.evidence):
-        growth, most = -evidence.fall, settings.tuning.evidence.max_loss
-        text = f"the error of validation runs grows by {100 * growth:.2g} %"
-        return FailedTest("error of validation runs", text, growth, most, "evidence.max_loss", at_least=False)
+        return FailedTest("significance", text, p_value, level, "pruning.level", at_least=False)
+    if guards.heldout_gain and evidence.gain < least:
+        text = f"held-out gain {100 * evidence.gain:.3g} %"
+        return FailedTest("held-out gain", text, evidence.gain, least, "surrogate.least_gain")
+    if guards.heldout_gain and evidence.repeatable and evidence.is_refuted:
+        text = f"the error of validation runs grows by {-100 * evidence.fall:.2g} %"
+        return FailedTest("error of validation runs", text, -evidence.fall, 0.0, at_least=False)
     return None
 
 

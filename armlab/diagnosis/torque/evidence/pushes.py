@@ -85,26 +85,24 @@ def reason_no_contact(stretch: Stretch, lead: Callable[[Array], float], tuning: 
     where that end was reached but once, in this stretch, the push has to be clearly likelier than a function of what is
     beyond. How far friction with a memory was bent when a run began is not known, and looks like a push.
     """
-    window, bounds = np.abs(stretch.window), tuning.evidence
-    pushed = window > bounds.push_level * window.max()
+    window, bounds = np.abs(stretch.window), tuning.pushes
+    pushed = window > bounds.level * window.max()
     moving = pushed & stretch.moving
     moving_s = float(np.sum(moving)) / stretch.rate_hz
-    if moving_s <= bounds.min_push_s or moving.sum() <= bounds.min_push_moving_share * pushed.sum():
+    if moving_s <= bounds.least_s or moving.sum() <= pushed.sum() / 2:
         return "the joint hardly moves during it"
     if not np.any(window == 0):
         return "it goes on all the time"
     if np.all(stretch.unsettled[pushed]):
         return "the friction of the joint may have been bent before"
-    for name, laws in _laws_of_the_end(stretch, pushed, bounds.max_extreme_share):
-        if min(lead(stretch.filtered(law)) for law in laws) < tuning.pruning.least_evidence:
+    for name, laws in _laws_of_the_end(stretch, pushed):
+        if min(lead(stretch.filtered(law)) for law in laws) < tuning.claims.max_deficit:
             return f"no other stretch has such a {name}"
     return None
 
 
-def _laws_of_the_end(
-    stretch: Stretch, pushed: NDArray[np.bool_], largest: float
-) -> Iterator[tuple[str, tuple[Array, ...]]]:
-    """Position, speed or torque of which more than a share of the push is beyond all else, and laws of what is beyond.
+def _laws_of_the_end(stretch: Stretch, pushed: NDArray[np.bool_]) -> Iterator[tuple[str, tuple[Array, ...]]]:
+    """Position, speed or torque of which most of the push is beyond all else, and laws of what is beyond.
 
     Each law has columns (samples, POWERS), by direction or not.
     """
@@ -117,6 +115,6 @@ def _laws_of_the_end(
     for name, values, sign in variables:
         low, high = values[others].min(), values[others].max()
         beyond = np.maximum(values - high, 0) + np.maximum(low - values, 0)
-        if np.mean(beyond[pushed] > 0) > largest:
+        if np.mean(beyond[pushed] > 0) > 1 / 2:
             powers = np.column_stack([np.where(beyond > 0, (beyond / beyond.max()) ** power, 0.0) for power in POWERS])
             yield name, (powers, powers * sign[:, None])

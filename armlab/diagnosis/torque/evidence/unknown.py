@@ -119,18 +119,9 @@ class FitOfAll:
         return Remainder(self.residual - self.rows @ moved, features)
 
 
-def flexible_gain(model: FittedModel, joint: int) -> float:
-    """What the best surrogate explains of what a model leaves at a joint (from 0): see `Structure.gain`."""
-    known, key = model.solver.flexible_gains, (model.state, joint)
-    if key not in known:
-        features = _features_of(model, joint, _load(model))
-        known[key] = max(each.gain for each in _surrogates(model, joint, features, model.noise))
-    return known[key]
-
-
 def is_structured(each: Structure, tuning: Tuning) -> bool:
     """Whether it is more than chance, and large enough to matter."""
-    return each.gain > tuning.surrogate.min_structure_gain and each.p_value < tuning.unknown.level
+    return each.gain > tuning.surrogate.least_gain and each.p_value < tuning.unknown.level
 
 
 def remaining(belief: Belief) -> tuple[Structure, ...]:
@@ -164,28 +155,20 @@ def unknown_evidence(model: FittedModel, each: Structure, before: Array, after: 
 
 def make_unknown_claim(model: FittedModel, each: Structure, residual: Array, weighed: Weighed) -> Claim:
     """The finding `unknown` at a joint, with its surrogate's prediction. weighed: names that it could have."""
-    own = residual[:, each.joint]
-    evidence = unknown_evidence(model, each, own, own - each.prediction)
+    own, joint = residual[:, each.joint], each.joint + 1
     prediction = np.zeros(residual.shape)
     prediction[:, each.joint] = each.prediction
-    return unknown_claim(each.joint + 1, evidence, prediction, each.depends_on, weighed)
-
-
-def unknown_claim(
-    joint: int, evidence: Evidence, prediction: Array, depends_on: tuple[str, ...], weighed: Weighed
-) -> Claim:
-    """The finding `unknown` at a joint (from 1). prediction: (rows, joints), N m; weighed: names that it could have."""
     return Claim(
         UNKNOWN.id,
         joint,
         (joint,),
         (),
-        f"tau_{joint} += f({', '.join(depends_on) or 'the motion'})",
-        evidence,
+        f"tau_{joint} += f({', '.join(each.depends_on) or 'the motion'})",
+        unknown_evidence(model, each, own, own - each.prediction),
         prediction,
         left_out=prediction,
         next_experiment=UNKNOWN.experiment,
-        depends_on=depends_on,
+        depends_on=each.depends_on,
         weighed=weighed,
     )
 

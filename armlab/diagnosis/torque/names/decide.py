@@ -48,13 +48,11 @@ class Naming:
     """What a finding may be called. answers: its names, and `unknown` for none of them, the likeliest first.
 
     claimed: the fewest of the likeliest answers that reach the level together, `unknown` perhaps among them; empty
-    where more are needed than a class may have, or their names alone are not probable enough. sure: whether names reach
-    the level without `unknown`.
+    where more are needed than a class may have, or their names alone are not probable enough.
     """
 
     answers: tuple[Member, ...]
     claimed: tuple[Member, ...]
-    sure: bool
 
     @property
     def is_unknown(self) -> bool:
@@ -95,13 +93,8 @@ def _naming(weighed: Iterable[Member], settings: Settings) -> Naming:
     likeliest = np.cumsum([each.probability for each in answers[:MAX_CLASS_NAMES]])
     enough = np.flatnonzero(likeliest >= MIN_NAME_PROBABILITY)
     together = answers[: enough[0] + 1] if len(enough) else ()
-    names = [each.probability for each in answers if each.effect != UNKNOWN.id]
     named = sum(each.probability for each in together if each.effect != UNKNOWN.id)
-    return Naming(
-        answers,
-        claimed=together if named >= tuning.least_names else (),
-        sure=sum(names[:MAX_CLASS_NAMES]) >= MIN_NAME_PROBABILITY,
-    )
+    return Naming(answers, claimed=together if named >= tuning.least_names else ())
 
 
 def named_claims(claims: Sequence[Claim], settings: Settings, plain: Collection[int] = ()) -> tuple[Claim, ...]:
@@ -110,7 +103,8 @@ def named_claims(claims: Sequence[Claim], settings: Settings, plain: Collection[
     Those without a name are one finding a joint; a law that loses its name and hardly lowers held-out errors is none.
     plain: joints, from 1, of whose friction the simulation says nothing. Every arm has friction and offsets: there they
     keep the law that was found, and only the law is in doubt. A link that is off keeps its name, too, where nothing is
-    likelier: no simulation knows its links exactly.
+    likelier: no simulation knows its links exactly. What follows the velocity of its joint alone and brakes is friction
+    whatever its law: of a curve that none of the names is right is no answer either.
     """
     out, least = list[Claim](), settings.tuning.naming.least_unnamed_fall
     for claim in claims:
@@ -185,7 +179,7 @@ def _named(claim: Claim, settings: Settings, plain: Collection[int]) -> Claim:
     naming, tuning = naming_of(claim.weighed, settings), settings.tuning.naming
     usual = claim.candidate is not None and (claim.candidate.facts.usual or claim.candidate.is_friction)
     has = claim.candidate is not None and (claim.candidate.facts.usual or _is_friction(claim))
-    if has and claim.evidence.joint + 1 in plain:
+    if has and (claim.evidence.joint + 1 in plain or claim.effect == FRICTION_CURVE_FACTS.id):
         naming = _naming(_given_that_it_is_there(naming.answers, claim), settings)
     identical = [each for each in claim.rivals if each.identical]
     known = {(each.effect, each.joint) for each in identical}

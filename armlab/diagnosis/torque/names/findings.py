@@ -10,6 +10,7 @@ from typing import Literal
 
 from armlab.common.told import MAX_CLASS_NAMES, MIN_CAUSE_PROBABILITY, MIN_NAME_PROBABILITY
 from armlab.diagnosis.result import Claim, Member, Part
+from armlab.diagnosis.torque.evidence.evidence import SMALLEST_CHANGE
 from armlab.diagnosis.torque.predict.parts import UNKNOWN_CAUSE, cause_of, is_in_no_model
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
@@ -18,7 +19,6 @@ FRICTION = "friction"
 STATED_SHARE = 0.95  # of the error: causes are told until they explain as much
 MAX_STATED_CAUSES = 4
 MAX_STATED_OF_JOINT = 2  # findings
-ROUNDING = 1e-4  # of a held-out error: a removal that changes less changes nothing that is shown
 
 Kind = Literal["name", "class", "cause", "nothing"]
 
@@ -133,7 +133,7 @@ def stated_findings(claims: Sequence[Claim], joints: int) -> tuple[Claim, ...]:
 
 
 def _is_missed(claim: Claim) -> bool:
-    return claim.removal is None or claim.removal.growth > ROUNDING
+    return claim.removal is None or claim.removal.growth > SMALLEST_CHANGE
 
 
 def _is_of_one_place(claim: Claim, joints: int) -> bool:

@@ -7,8 +7,8 @@ likelier the more structure is left beside the finding, the better a flexible la
 unusual about its joint. It is likelier, too, where the errors of the model are coloured, for they are then more than
 noise, and where a finding explains less of the validation runs.
 
-Three kinds of findings are weighed, each with numbers of its own: what passed all tests (`found`), what would still
-raise the log evidence (`left`), and structure of which only a surrogate knows (`structure`).
+Two kinds of findings are weighed, each with numbers of its own: what passed all tests (`found`), and structure of which
+only a surrogate knows (`structure`).
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -25,7 +25,7 @@ from armlab.diagnosis.torque.columns.solver import Fit, Solver, State
 from armlab.diagnosis.torque.evidence.added_body import PlacedBody, payload_groups, place_body
 from armlab.diagnosis.torque.evidence.evidence import Evidence
 from armlab.diagnosis.torque.evidence.plausibility import is_of_no_arm
-from armlab.diagnosis.torque.evidence.unknown import flexible_gain, is_structured, predicted_share
+from armlab.diagnosis.torque.evidence.unknown import is_structured, predicted_share
 from armlab.diagnosis.torque.search.fitted_model import FittedModel
 from armlab.diagnosis.torque.search.search import Search
 from armlab.diagnosis.torque.search.surrogate import Structure
@@ -36,8 +36,7 @@ from armlab.effects.parameters import parameter_values
 from armlab.effects.term import SIGN_SIGMAS
 
 Place = int | None  # a joint or link, from 1; None for the whole robot
-Kind = Literal["found", "left", "structure"]
-LEAST_GAIN = 0.02  # of the held-out error, where gains are compared as ratios
+Kind = Literal["found", "structure"]
 MOST_COLOUR = 1.0  # of errors, a logarithm; beyond, the rate of samples says more than the arm does
 
 
@@ -96,31 +95,6 @@ def weigh_link(
     return _weighed("found", trials, none, (link + 1, ()), model, without)
 
 
-def weigh_addition(
-    model: FittedModel, group: int, added: State, evidence: Evidence, left: Sequence[Structure]
-) -> Weighed:
-    """The names of what a group would still explain beside a model that does not hold it.
-
-    added: the state with it; evidence: of the group in that state. left: structure that the model leaves at its joints.
-    """
-    candidate = model.candidate(group)
-    none = {
-        "left none": 1.0,
-        "left p": negative_logarithm(evidence.corrected, 30) / 10,
-        "left chance": negative_logarithm(evidence.corrected, 6) / 6,
-        "left held-out chance": negative_logarithm(evidence.held_p, 6) / 6,
-        "left gain": float(np.log1p(10 * max(evidence.gain, 0.0))),
-        "left validated": float(np.clip(5 * evidence.validation_gain, -1, 1)),
-        "left worse": float(evidence.is_refuted(model.design.settings.tuning.evidence)),
-        "left colour": _colour(model, evidence.joint),
-        "left structure": _structured_share(model, left, evidence.joint),
-        "left structure chance": _structure_chance(left, evidence.joint),
-        "left flexible": _flexible_ratio(model, evidence),
-    }
-    trials = _in_place(model, model.state, group, beside=added)
-    return _weighed("left", trials, none, (candidate.joint, candidate.joints), model, model.state)
-
-
 def weigh_structure(model: FittedModel, structure: Structure, claimed: Iterable[int]) -> Weighed:
     """The names of structure that only a surrogate explains. claimed: effects of the model."""
     joint = structure.joint + 1
@@ -172,17 +146,16 @@ def _for_name(kind: Kind, trial: _NameTrial, best: float, score: float, error: A
         f"{kind} deficit": float(np.log1p(deficit)),
         f"{kind} near deficit": min(deficit, 30.0) / 10,
     }
-    if kind != "structure":
-        out[f"{kind} searched"] = float(trial.own)
     if trial.in_motion is not None:
         out |= {
             "shifts where a joint sticks": 1.0,
             "early where a joint sticks": float(trial.early),
             "shifts in motion": float(np.log1p(max(trial.in_motion, 0.0))),
         }
-    if kind == "found":
-        return out | {"found growth": min(float(np.log1p(10 * max(_growth(trial.error, error), 0.0))), 3.0)}
-    return out | {f"{kind} earned": float(np.log1p(trial.score - score))}
+    if kind == "structure":
+        return out | {"structure earned": float(np.log1p(trial.score - score))}
+    growth = min(float(np.log1p(10 * max(_growth(trial.error, error), 0.0))), 3.0)
+    return out | {"found searched": float(trial.own), "found growth": growth}
 
 
 def _against_found(
@@ -234,13 +207,6 @@ def _structured_share(model: FittedModel, left: Sequence[Structure], joint: int)
     return max((predicted_share(each) for each in here), default=0.0)
 
 
-def _flexible_ratio(model: FittedModel, evidence: Evidence) -> float:
-    """The logarithm of how much more a flexible law explains beside a model than what would be added explains."""
-    flexible = flexible_gain(model, evidence.joint)
-    ratio = (max(flexible, 0.0) + LEAST_GAIN) / (max(evidence.gain, 0.0) + LEAST_GAIN)
-    return max(float(np.log(ratio)), -2.0)
-
-
 def _bent_gain(model: FittedModel, without: State, group: int) -> float:
     """By how much a scale that bends raises the log likelihood more than the scale of the library in whose place it is.
 
@@ -288,7 +254,7 @@ def _in_place(
     search = Search(solver, model.design.settings, True, 0)
     scores, seen = search.gains(without), set[tuple[str, Place]]()
     taken = None if own is None else (solver.candidate(own).effect, solver.candidate(own).joint)
-    others = frozenset() if beside is None else _independent(search, scores, beside, tuning.max_independent)
+    others = frozenset() if beside is None else _independent(search, scores, beside)
     for number in map(int, np.argsort(-scores)):
         candidate = solver.candidate(number)
         key = candidate.effect, candidate.joint
@@ -350,12 +316,9 @@ def _gain_in_motion(model: FittedModel, without: State, fit: Fit, joints: Sequen
     return gain
 
 
-def _independent(search: Search, scores: Array, beside: State, share: float) -> frozenset[int]:
-    """Groups that raise the score of a state nearly as much as they do without what is weighed there.
-
-    scores: how much they do without it. share: of that, which is no less than nearly as much.
-    """
-    keep = search.gains(beside) > share * np.maximum(scores, 0.0)
+def _independent(search: Search, scores: Array, beside: State) -> frozenset[int]:
+    """Groups that raise the score of a state by most of what they do without what is weighed there, `scores`."""
+    keep = search.gains(beside) > np.maximum(scores, 0.0) / 2
     return frozenset(int(each) for each in np.flatnonzero(keep) if not search.has_no_room(beside, int(each)))
 
 

@@ -176,7 +176,7 @@ class _Judge:
     @classmethod
     def of(cls, design: DesignMatrix) -> "_Judge":
         """The rows of a design; blocks are alike long."""
-        observed, count = design.observed, design.settings.tuning.prediction.folds
+        observed, count = design.observed, design.settings.tuning.blocks.folds
         rows = rows_in(observed.of_role("identify"), observed.rows)
         run = np.concatenate([np.full(len(each.torque), index) for index, each in enumerate(observed.signals)])
         block = np.zeros(observed.rows, dtype=np.intp)
@@ -242,13 +242,13 @@ class _Trial:
         )
 
     @property
-    def _tuning(self) -> PredictionTuning:
-        return self.model.design.settings.tuning.prediction
+    def _folds(self) -> int:
+        return self.model.design.settings.tuning.blocks.folds
 
     @cached_property
     def _normal(self) -> tuple[Array, Array]:
         """Normal equations without each fold: (folds, parameters, parameters) and (folds, parameters)."""
-        count, size = self._tuning.folds, self.rows.designs[0].shape[1]
+        count, size = self._folds, self.rows.designs[0].shape[1]
         grams, products = np.zeros((count, size, size)), np.zeros((count, size))
         for design, target, fold in zip(self.rows.designs, self.rows.errors, self.fitting, strict=True):
             for number in range(count):
@@ -269,7 +269,7 @@ class _Trial:
         for design, target, fold in zip(self.judged.designs, self.judged.errors, self.judging, strict=True):
             used = np.flatnonzero(np.any(design != 0, axis=0))
             both = np.column_stack([design[:, used], target])
-            out.append([(used, both[fold == number].T @ both[fold == number]) for number in range(self._tuning.folds)])
+            out.append([(used, both[fold == number].T @ both[fold == number]) for number in range(self._folds)])
         return out
 
     def errors(self, state: State) -> Array:

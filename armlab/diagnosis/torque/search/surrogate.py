@@ -157,14 +157,14 @@ class Surrogate:
         power = float(np.mean(residual[rows] ** 2))
         share = 1 - float(np.mean((residual[rows] - prediction[rows]) ** 2)) / max(power, 1e-300)
         found: tuple[str, ...] = ()
-        if self.gain > tuning.min_structure_gain:
+        if self.gain > tuning.least_gain:
             found = _important_variables(self.left.features, *self.sums, self.judged, self.ridge, tuning)
         return Structure(self.joint, self.gain, self.p_value, self.validation_gain, share, prediction, found)
 
 
 def surest(surrogates: Iterable[Surrogate], tuning: SurrogateTuning) -> Surrogate:
     """The surrogate that is least by chance among those that explain enough."""
-    return min(surrogates, key=lambda each: (each.gain <= tuning.min_structure_gain, each.p_value))
+    return min(surrogates, key=lambda each: (each.gain <= tuning.least_gain, each.p_value))
 
 
 def fit_surrogate(
@@ -180,7 +180,7 @@ def fit_surrogate(
     plain = replace(noise, taps=tuple(np.ones(1) for _ in noise.taps), scales=tuple(1.0 for _ in noise.taps))
     whitened = _Regression.of(learnt, joint, noise, observed, tuning)
     raw = _Regression.of(learnt, joint, plain, observed, tuning, learnt.features.grams)
-    counted = [whitened, raw] if raw.validated.share > tuning.min_structure_gain else [whitened]
+    counted = [whitened, raw] if raw.validated.share > tuning.least_gain else [whitened]
     return surest([each.surrogate(whole, tuning) for each in counted], tuning)
 
 
@@ -238,7 +238,7 @@ class _Regression:
         sums = _grams(columns, thirds), tuple(columns[own].T @ target[own] for own in thirds)
         turned = errors_in_turn(columns, target, thirds, self.ridge, *sums)
         inside, validated = held_out_gain(target, turned, self.blocks), self.validated
-        least, in_turn = tuning.min_structure_gain, None
+        least, in_turn = tuning.least_gain, None
         if (inside.share <= least, inside.chance) < (validated.share <= least, validated.chance):
             best, left, judged, in_turn = inside, whole, (columns, target), sums
         else:

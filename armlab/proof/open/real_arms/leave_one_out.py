@@ -35,7 +35,7 @@ TRIED_VALUES: Mapping[str, tuple[float, ...]] = {  # beside the usual value of e
     "noise.max_prediction_loss": (0.0, 0.1),
     "search.rounds": (1, 3),
     "solver.crowd_penalty": (2.0, 8.0),
-    "pruning.least_evidence": (30.0, 120.0),
+    "pruning.level": (0.001, 0.05),
 }
 FITTED_SHARE = 2 / 3  # of each identification run; what follows is held out for the choice
 OUTCOMES_FOLDER = ".leave-one-out"

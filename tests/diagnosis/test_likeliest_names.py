@@ -1,4 +1,4 @@
-"""What is added to a model because its name is probable."""
+"""Effects that passed take the likeliest names of their findings."""
 
 from dataclasses import replace
 
@@ -14,12 +14,9 @@ from armlab.diagnosis.torque.columns.design import DesignMatrix
 from armlab.diagnosis.torque.columns.solver import State
 from armlab.diagnosis.torque.diagnose import prepare
 from armlab.diagnosis.torque.evidence.evidence import Judge
-from armlab.diagnosis.torque.names.additions import (
+from armlab.diagnosis.torque.names.likeliest_names import (
     Found,
-    _acting_where,
     _added,
-    _named,
-    add_probable,
     with_likeliest_names,
 )
 from armlab.diagnosis.torque.names.weighing import _is_of_no_arm, _NameTrial, _weighed, weigh_effect
@@ -65,27 +62,9 @@ def found_as(model: FittedModel, effect: str) -> Found:
     search = Search(model.solver, model.design.settings, True, 0)
     candidates = [each.candidate for each in model.solver.groups]
     named = (at for at, each in enumerate(candidates) if (each.effect, each.joint) == (effect, 2))
-    found = next(each for each in (_added(model, search, at, 0.0) for at in named) if each is not None)
+    found = next(each for each in (_added(model, search, at) for at in named) if each is not None)
     assert found[2].score > 0
     return found
-
-
-def test_what_is_added_has_the_likeliest_name(model: FittedModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever raised the score: here weights that ask for nothing but the name."""
-    monkeypatch.setattr(
-        "armlab.diagnosis.torque.names.decide.calibrated_weights", lambda: Weights({"is cable_stiffness": 9.0})
-    )
-    spring_found = found_as(model, "cable_stiffness")
-    for first in (found_as(model, "gravity_compensator"), spring_found):
-        (group, _, evidence), names = _named(model, first, ())
-        assert (group, evidence.score) == (spring_found[0], spring_found[2].score)
-        assert names[-1].is_none
-
-
-def test_none_of_the_names_changes_nothing(model: FittedModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armlab.diagnosis.torque.names.decide.calibrated_weights", lambda: Weights({"left none": 9.0}))
-    first = found_as(model, "gravity_compensator")
-    assert _named(model, first, ())[0] is first
 
 
 def holding(model: FittedModel, effect: str) -> FittedModel:
@@ -114,7 +93,7 @@ def test_what_passed_keeps_its_name_where_the_numbers_of_a_likelier_one_cannot_b
         "armlab.diagnosis.torque.names.decide.calibrated_weights", lambda: Weights({"is cable_stiffness": 9.0})
     )
     monkeypatch.setattr(
-        "armlab.diagnosis.torque.names.additions.doubtful_names",
+        "armlab.diagnosis.torque.names.likeliest_names.doubtful_names",
         lambda model, effects, exact: dict.fromkeys(effects, "stiffness may be zero"),
     )
     held = holding(model, "gravity_compensator")
@@ -133,39 +112,6 @@ def test_what_passed_keeps_its_name_where_none_is_likelier(model: FittedModel, m
         )
         belief = Belief(held, known)
         assert with_likeliest_names(belief) is belief
-
-
-def test_what_is_added_in_the_place_of_an_effect_leaves_no_trace_of_it(
-    model: FittedModel, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Without the guard that asks what is left: one law replaces another."""
-    settings = model.design.settings
-    plain = replace(settings, guards=replace(settings.guards, unknown=False))
-    held = holding(replace(model, design=replace(model.design, settings=plain)), "gravity_compensator")
-    (old,) = held.state.groups
-    evidence = Judge(held, held.state).effects()[old]
-    found = found_as(model, "cable_stiffness")
-    weights = Weights({"is cable_stiffness": 9.0})
-    monkeypatch.setattr("armlab.diagnosis.torque.names.decide.calibrated_weights", lambda: weights)
-    names = weigh_effect(replace(model, state=found[1]), found[0], {found[0]: found[2]}, ())
-    monkeypatch.setattr("armlab.diagnosis.torque.names.additions.doubtful_names", lambda *_, **exact: {})
-    monkeypatch.setattr("armlab.diagnosis.torque.names.additions._named", lambda *_: (found, names))
-    likeliest = iter([found])
-    monkeypatch.setattr("armlab.diagnosis.torque.names.additions._likeliest", lambda *_: next(likeliest, None))
-    named = add_probable(Belief(held, {old: evidence}))
-    assert set(named.effects) == {found[0]} == set(named.model.state.groups)
-
-
-def test_what_is_refused_bans_what_acts_at_the_joint_that_shows_it(model: FittedModel) -> None:
-    rows = [each.candidate.rows for each in model.solver.groups]
-    whole = next(at for at, own in enumerate(rows) if len(own) == 3)
-    evidence = found_as(model, "cable_stiffness")[2]
-    banned = _acting_where(model, (whole, model.state, evidence))
-    assert whole in banned
-    assert all(evidence.joint in rows[each] for each in banned)
-    single = _acting_where(model, found_as(model, "cable_stiffness"))
-    assert single < banned
-    assert {rows[each] for each in single} == {(1,)}
 
 
 @pytest.mark.parametrize("effect", ["gravity_compensator", "cable_stiffness"])
