@@ -25,7 +25,6 @@ from armlab.diagnosis.torque.evidence.evidence import Evidence
 from armlab.diagnosis.torque.evidence.plausibility import _reason_other_mass, reason_link_unknown
 from armlab.diagnosis.torque.search.fitted_model import fit_background
 from armlab.diagnosis.torque.search.surrogate import Structure
-from armlab.diagnosis.tuning import Tuning
 from armlab.effects.library import library
 from armlab.effects.links import BODY_SIZE_M, Payload, PointPayload, SolidBody
 from armlab.effects.parameters import ParameterValue
@@ -130,7 +129,7 @@ def reason_beside(joint: int, size: float, depends_on: tuple[str, ...], link: in
     evidence = Evidence(1, 0.0, 0.0, 0.9, 0.0, 0.9, 9.0, 1.0, 500.0)
     load = Claim("payload", link, (link,), (), "", evidence, torque, candidate=SolidBody.of_body(ARM, link, BODY))
     left = Structure(joint - 1, 0.9, 1e-9, 0.9, 0.9, size * np.cos(np.linspace(0, 20, 500)), depends_on)
-    return reason_link_unknown(load, [left], np.ones(3), Tuning())
+    return reason_link_unknown(load, [left], np.ones(3))
 
 
 def test_a_load_is_not_told_beside_structure_that_could_be_half_of_it() -> None:

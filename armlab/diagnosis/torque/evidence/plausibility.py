@@ -22,7 +22,7 @@ from armlab.diagnosis.torque.rows.data import Observed
 from armlab.diagnosis.torque.search.fitted_model import FittedModel
 from armlab.diagnosis.torque.search.search import FailedTest, Step
 from armlab.diagnosis.torque.search.surrogate import Structure
-from armlab.diagnosis.tuning import PlausibilityTuning, Tuning
+from armlab.diagnosis.tuning import PlausibilityTuning
 from armlab.effects.contract import Candidate, Kind, Parameter
 from armlab.effects.links import SolidBody
 from armlab.effects.parameters import ParameterValue, parameter_values
@@ -84,18 +84,17 @@ def links_that_data_tell(
 ) -> tuple[FittedModel, tuple[Claim, ...]]:
     """The claims without those on a link or a load of which these data do not tell; the log says why not.
 
-    No parameter of a link that is off differs from zero, and it is not certain that the link is off. Or structure is
-    left without a name that could be much of what the claim explains; structure of the friction of a joint speaks of
-    links at the joint alone that shows the claim best; at a joint beyond the link any structure speaks against it,
-    because a later link may carry what was found. Or a load has another mass where it is found anew beside all that is
-    named. left: what is structured beyond chance.
+    Structure is left without a name that could be much of what the claim explains; structure of the friction of a joint
+    speaks of links at the joint alone that shows the claim best; at a joint beyond the link any structure speaks
+    against it, because a later link may carry what was found. Or a load has another mass where it is found anew beside
+    all that is named. left: what is structured beyond chance.
     """
     kept, steps, noise = [], list(model.steps), model.residual(model.fit)
     for each in left:
         noise[:, each.joint] -= each.prediction
     size = np.maximum(np.std(noise, axis=0), SMALLEST_TORQUE)
     for claim in claims:
-        reason = reason_link_unknown(claim, left, size, model.design.settings.tuning)
+        reason = reason_link_unknown(claim, left, size)
         reason = reason or _reason_other_mass(model, claim)
         if reason is None:
             kept.append(claim)
@@ -105,7 +104,7 @@ def links_that_data_tell(
     return replace(model, steps=tuple(steps)), tuple(kept)
 
 
-def reason_link_unknown(claim: Claim, left: Sequence[Structure], noise: Array, tuning: Tuning) -> str | None:
+def reason_link_unknown(claim: Claim, left: Sequence[Structure], noise: Array) -> str | None:
     """Why these data do not tell of a claim about a link or its load; None where they do, and for other claims.
 
     noise: (joints,), N m, what is left at each joint beside structure. A joint tells of the claim by the square of its
@@ -114,8 +113,6 @@ def reason_link_unknown(claim: Claim, left: Sequence[Structure], noise: Array, t
     """
     if claim.candidate is None or claim.candidate.facts.where != "link":
         return None
-    if claim.in_links and not _differs_from_zero(claim):
-        return "no parameter differs from zero"
     felt, link = np.std(claim.prediction, axis=0) / noise, claim.candidate.joints[0]
     for each in left:
         if each.joint != claim.evidence.joint and _is_of_friction(each):
@@ -145,12 +142,6 @@ def _reason_other_mass(model: FittedModel, claim: Claim) -> str | None:
     if low <= found <= high:
         return None
     return f"found anew beside all that is named its mass is {found:.4g} kg, outside its interval"
-
-
-def _differs_from_zero(claim: Claim) -> bool:
-    intervals = [each.interval for each in claim.parameters if each.interval is not None]
-    ends = np.concatenate([np.reshape(each, (-1, 2)) for each in intervals]) if intervals else np.empty((0, 2))
-    return bool(np.any((ends[:, 0] > 0) | (ends[:, 1] < 0)))
 
 
 def reason_implausible(
