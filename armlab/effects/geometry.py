@@ -11,7 +11,6 @@ from armlab.common.arrays import Array
 from armlab.effects.contract import ANGLE, Candidate, Effect, Parameter, Range, Scene, Value
 from armlab.effects.sensitivity import (
     GEOMETRY_STEP,
-    directional_derivative,
     geometry_derivative,
     gravity_derivative,
     horizontal_directions,
@@ -153,9 +152,8 @@ class EncoderOffset(Term):
 
     def columns(self, scene: Scene) -> Array:
         """Derivative of the rigid torque by what the encoder reads too much."""
-        change = np.zeros((3, *scene.motion.position.shape))
-        change[0, :, self.joints[0] - 1] = -1.0
-        return directional_derivative(scene, Motion(*change))[:, :, None]
+        by_angle, _ = scene.torque_slopes(self.joints[0] - 1)
+        return -by_angle[:, :, None]
 
     def equation(self, coefficients: Array) -> str:
         return f"q_{self.joint} = {format_less('recorded', coefficients[0])}"

@@ -12,7 +12,7 @@ from problem.motion import Motion
 from problem.pseudo_inertia import least_eigenvalues
 from problem.regressor import inertia_column, rigid_body_torque
 
-MOTION_STEP = 1e-4  # rad (m) of the largest change of position, for differences
+MOTION_STEP = 1e-6  # rad (m), rad/s (m/s), for differences: what they are off by is as small
 NO_INERTIA = 1e-9  # an eigenvalue of a pseudo-inertia, which rounding leaves of none
 
 
@@ -52,42 +52,60 @@ class Scene:
     @cached_property
     def rigid_torque(self) -> Array:
         """What the links of the present model need, without friction: (samples, joints), N m (N)."""
-        return rigid_body_torque(self.arm, self.motion, self.inertial)
+        return self.links_torque
 
     @cached_property
-    def own_inertia(self) -> Array:
-        """Inertia that each joint feels of the links of the present model, its rotor left out: (samples, joints),
-        kg m2 (kg).
+    def links_torque(self) -> Array:
+        """The rigid torque of this motion, (samples, joints), N m (N): what its derivatives start from."""
+        return rigid_body_torque(self.arm, self.motion, self.inertial)
+
+    def torque_along(self, joint: int, change: Array) -> Array:
+        """By how much the rigid torque of all joints grows, to first order, as one joint (from 0) moves otherwise.
+
+        change: (3, samples), of its angle, speed and acceleration. Returns (samples, joints), N m (N).
         """
-        arm, position = self.arm, self.motion.position
-        columns = (inertia_column(arm, position, joint, self.inertial)[:, joint] for joint in range(len(arm)))
-        return np.column_stack(list(columns))
+        angle, speed, acceleration = change[:, :, None]
+        by_angle, by_speed = self.torque_slopes(joint)
+        return np.asarray(by_angle * angle + by_speed * speed + self.torque_by_acceleration(joint) * acceleration)
 
-    def own_torque_slopes(self, joint: int) -> tuple[Array, Array]:
-        """By how much the rigid torque of a joint (from 0) grows with its own angle and with its own speed, (samples,).
+    def torque_by_acceleration(self, joint: int) -> Array:
+        """How the rigid torque of all joints grows with the acceleration of one (from 0), (samples, joints), kg m2.
 
-        N m/rad and N m s/rad (N/m, N s/m). Computed once: hundreds of springs and gaps of a joint ask for it.
+        Its own entry is the inertia that the joint feels of the links of the present model, its rotor left out.
+        """
+        if joint not in self._by_acceleration:
+            column = inertia_column(self.arm, self.motion.position, joint, self.inertial)
+            self._by_acceleration[joint] = _read_only(column)
+        return self._by_acceleration[joint]
+
+    def torque_slopes(self, joint: int) -> tuple[Array, Array]:
+        """The same with the angle and with the speed of a joint, (samples, joints), N m/rad and N m s/rad (N/m, N s/m).
+
+        Differences, computed once: hundreds of springs and gaps of a joint ask for them.
         """
         if joint not in self._slopes:
             self._slopes[joint] = self._compute_slopes(joint)
         return self._slopes[joint]
 
     @cached_property
+    def _by_acceleration(self) -> dict[int, Array]:
+        return {}
+
+    @cached_property
     def _slopes(self) -> dict[int, tuple[Array, Array]]:
         return {}
 
     def _compute_slopes(self, joint: int) -> tuple[Array, Array]:
-        motion, ends = self.motion, []
-        for sign in (1, -1):
-            position, velocity = motion.position.copy(), motion.velocity.copy()
-            position[:, joint] += sign * MOTION_STEP
-            velocity[:, joint] += sign * MOTION_STEP
-            changed = (
-                Motion(position, motion.velocity, motion.acceleration),
-                Motion(motion.position, velocity, motion.acceleration),
-            )
-            ends.append([rigid_body_torque(self.arm, each, self.inertial)[:, joint] for each in changed])
-        by_angle, by_speed = ((more - less) / (2 * MOTION_STEP) for more, less in zip(*ends, strict=True))
+        motion = self.motion
+        position, velocity = motion.position.copy(), motion.velocity.copy()
+        position[:, joint] += MOTION_STEP
+        velocity[:, joint] += MOTION_STEP
+        changed = (
+            Motion(position, motion.velocity, motion.acceleration),
+            Motion(motion.position, velocity, motion.acceleration),
+        )
+        more = (rigid_body_torque(self.arm, each, self.inertial) for each in changed)
+        by_angle, by_speed = ((each - self.links_torque) / MOTION_STEP for each in more)
         return _read_only(by_angle), _read_only(by_speed)
 
     @cached_property
@@ -96,8 +114,8 @@ class Scene:
         return bool(np.all(least_eigenvalues(self.inertial) > -NO_INERTIA))
 
     @cached_property
-    def derived(self) -> "dict[tuple[object, ...], Scene]":
-        """Scenes that a law makes of this one, by what it makes them with; it keeps few."""
+    def derived(self) -> dict[tuple[object, ...], object]:
+        """What a law makes of this scene and asks for again, by what it makes it with; it keeps few."""
         return {}
 
     @property

@@ -1,4 +1,4 @@
-"""How the rigid torque changes with the motion, the geometry and gravity: central differences.
+"""How the rigid torque changes with the geometry and gravity, by differences; derivatives of signals.
 
 The rigid torque of ten thousand samples costs a millisecond or two, so differences of it are cheaper
 than any formula, and have no errors of their own kind.
@@ -12,40 +12,11 @@ from scipy.signal import savgol_filter
 
 from armlab.common.arrays import Array
 from armlab.effects.contract import Scene
-from armlab.effects.scene import MOTION_STEP
 from problem.arm import Joint
-from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 
-GEOMETRY_STEP = 1e-4  # m, rad
+GEOMETRY_STEP = 1e-6  # m, rad
 WINDOW, ORDER = 9, 4  # samples and degree of the light low-pass (Savitzky and Golay 1964) that differentiates
-
-
-def directional_derivative(scene: Scene, change: Motion) -> Array:
-    """Derivative of the rigid torque along a change of the motion: (samples, joints), N m (N) a unit of it."""
-    motion = scene.motion
-    size = float(np.abs(change.position).max())
-    if not size:
-        return np.zeros(motion.position.shape)
-    step = MOTION_STEP / size
-    ends = [
-        Motion(
-            motion.position + sign * step * change.position,
-            motion.velocity + sign * step * change.velocity,
-            motion.acceleration + sign * step * change.acceleration,
-        )
-        for sign in (1, -1)
-    ]
-    forwards, backwards = (rigid_body_torque(scene.arm, end, scene.inertial) for end in ends)
-    return (forwards - backwards) / (2 * step)
-
-
-def joint_displacement(scene: Scene, joint: int, change: Array) -> Motion:
-    """A motion in which only one joint (from 0) moves, by `change` (samples,), with its own derivatives."""
-    moved = np.zeros((3, *scene.motion.position.shape))
-    for derivative in range(3):
-        moved[derivative, :, joint] = smooth_derivative(change, scene.step, derivative)
-    return Motion(*moved)
 
 
 def smooth_derivative(signal: Array, step: float, order: int) -> Array:
@@ -64,9 +35,8 @@ def delay_signal(scene: Scene, signal: Array, seconds: float) -> Array:
 
 def gravity_derivative(scene: Scene, direction: Array) -> Array:
     """Change of the rigid torque with gravity along a direction (3,): exact, for it is linear in gravity."""
-    changed = [replace(scene.arm, gravity=_vector(np.array(scene.arm.gravity) + sign * direction)) for sign in (1, -1)]
-    more, less = (rigid_body_torque(arm, scene.motion, scene.inertial) for arm in changed)
-    return (more - less) / 2
+    changed = replace(scene.arm, gravity=_vector(np.array(scene.arm.gravity) + direction))
+    return rigid_body_torque(changed, scene.motion, scene.inertial) - scene.links_torque
 
 
 def horizontal_directions(gravity: Array) -> tuple[Array, Array]:
@@ -84,12 +54,10 @@ def geometry_derivative(scene: Scene, joint: int, changed: Callable[[Joint, floa
 
     changed: the joint with a change of a size. The links' bodies stay where they are in their frames.
     """
-    torques = []
-    for step in (GEOMETRY_STEP, -GEOMETRY_STEP):
-        joints = list(scene.arm.joints)
-        joints[joint] = changed(joints[joint], step)
-        torques.append(rigid_body_torque(replace(scene.arm, joints=tuple(joints)), scene.motion, scene.inertial))
-    return (torques[0] - torques[1]) / (2 * GEOMETRY_STEP)
+    joints = list(scene.arm.joints)
+    joints[joint] = changed(joints[joint], GEOMETRY_STEP)
+    torque = rigid_body_torque(replace(scene.arm, joints=tuple(joints)), scene.motion, scene.inertial)
+    return (torque - scene.links_torque) / GEOMETRY_STEP
 
 
 def _vector(values: Array) -> tuple[float, float, float]:

@@ -11,21 +11,18 @@ that is soft about its softest.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Effect, Parameter, Scene, Value
-from armlab.effects.scene import NO_INERTIA
-from armlab.effects.sensitivity import directional_derivative, horizontal_directions
+from armlab.effects.sensitivity import horizontal_directions
 from armlab.effects.term import Term, TermFamily, format_number
-from armlab.effects.transmission import Twist, felt_inertia, integrate_twist
+from armlab.effects.transmission import Load, Twist, integrate_twist, positive_inertia
 from problem.arm import Arm, Joint
 from problem.motion import Motion
-from problem.pseudo_inertia import least_eigenvalues
-from problem.regressor import MAX_JOINTS, inertia_column
+from problem.regressor import MAX_JOINTS
 from problem.transforms import inverse, turn_z_to
 
 FLEXIBLE_BASE_FACTS = Effect(
@@ -54,55 +51,78 @@ RIGID_HZ = 200.0  # a resonance that no recording shows: the base follows its mo
 LOOKS_HZ = (RIGID_HZ, 20.0, 12.0, 8.0, 5.0)  # of a first look
 RESONANCE_RANGE = (2.0, RIGID_HZ)
 DIRECTIONS = tuple(np.linspace(0, np.pi, 4, endpoint=False).tolist())  # of the axis, rad, of a first look
+BASIS = (0.0, np.pi / 4, np.pi / 2)  # directions of three axes, rad, from which that about any other axis follows
 TURN_RANGE = (-np.pi, 2 * np.pi)  # of a direction that is found anywhere from 0 to pi
 
 
 @dataclass(frozen=True, eq=False)
-class StandingScene(Scene):
-    """A scene whose arm has the base as one joint more, before its own, which stands still."""
+class TurningBase:
+    """A base that turns about an axis. load: of its spring. by_turn: how the torque of the joints grows with its angle,
+    its speed and its acceleration, (3, samples, joints).
+    """
 
-    @cached_property
-    def own_inertia(self) -> Array:
-        """Inertia about the axis of the base, (samples, 1), kg m2; that of the arm's joints is not asked."""
-        return inertia_column(self.arm, self.motion.position, 0, self.inertial)[:, :1]
-
-    @cached_property
-    def has_bodies(self) -> bool:
-        return bool(np.all(least_eigenvalues(self.inertial[10:]) > -NO_INERTIA))
+    load: Load
+    by_turn: Array
 
     def stiffness(self, hertz: float) -> float:
         """Of a base with this resonance, N m/rad."""
-        return float(felt_inertia(self, 0).mean()) * (2 * np.pi * hertz) ** 2
+        return float(self.load.inertia.mean()) * (2 * np.pi * hertz) ** 2
 
     def torque_on_spring(self, law: Twist) -> Array:
-        """Change of the torque of the arm's own joints as the base turns, (samples, joints)."""
-        moved = np.zeros((3, *self.motion.position.shape))
-        moved[:, :, 0] = integrate_twist(self, 0, law)
-        return directional_derivative(self, Motion(*moved))[:, 1:]
+        """Change of the torque of the joints as the base turns, (samples, joints)."""
+        return np.asarray(np.einsum("ds,dsj->sj", integrate_twist(self.load, law), self.by_turn))
 
 
-def standing_scene(scene: Scene, axis: Array) -> StandingScene:
-    """The scene with the base as a joint. axis: its direction in the base frame, (3,).
+@dataclass(frozen=True, eq=False)
+class StandingArm:
+    """The arm of a scene on a base that stands still, and what turning it about the axes of `BASIS` changes.
 
-    The axes of a first look, which come first, are kept: each resonance is asked about each of them.
+    moments: of the base about the first and the last axis, (2, samples). growth: how the moment about each axis grows
+    with the turn about it, its speed and its acceleration, (3 axes, 3, samples). by_turn: the same of the torque of the
+    joints, about the first and the last axis, (2, 3, samples, joints).
     """
-    key = ("standing", *axis.tolist())
-    if key not in scene.derived:
-        made = _make_standing_scene(scene, axis)
-        if len(scene.derived) >= len(DIRECTIONS):
-            return made
-        scene.derived[key] = made
-    return scene.derived[key]  # type: ignore[return-value]
+
+    step: float
+    has_bodies: bool
+    moments: Array
+    growth: Array
+    by_turn: Array
+
+    @classmethod
+    def of(cls, scene: Scene, first: Array, second: Array) -> "StandingArm":
+        """first, second: horizontal axes across each other, in the base frame, (3,)."""
+        turns = [_scene_on_base(scene, np.cos(turn) * first + np.sin(turn) * second) for turn in BASIS]
+        slopes = [np.stack([*each.torque_slopes(0), each.torque_by_acceleration(0)]) for each in turns]
+        return cls(
+            scene.step,
+            scene.has_bodies,
+            np.stack([turns[0].rigid_torque[:, 0], turns[-1].rigid_torque[:, 0]]),
+            np.stack([each[:, :, 0] for each in slopes]),
+            np.stack([slopes[0][:, :, 1:], slopes[-1][:, :, 1:]]),
+        )
+
+    def about(self, turn: float) -> TurningBase:
+        """About any horizontal axis, without an error: moments and torques are linear in the axis.
+
+        How the moment about the axis itself grows is of second degree in it.
+        """
+        cos, sin = np.cos(turn), np.sin(turn)
+        linear, square = np.array([cos, sin]), np.array([cos * (cos - sin), 2 * cos * sin, sin * (sin - cos)])
+        by_angle, by_speed, inertia = np.tensordot(square, self.growth, 1)
+        slopes = (by_angle, by_speed) if self.has_bodies else None
+        load = Load(self.step, linear @ self.moments, positive_inertia(inertia), slopes)
+        return TurningBase(load, np.tensordot(linear, self.by_turn, 1))
 
 
-def _make_standing_scene(scene: Scene, axis: Array) -> StandingScene:
+def _scene_on_base(scene: Scene, axis: Array) -> Scene:
+    """The scene with the base as one joint more, which stands still. axis: its direction in the base frame, (3,)."""
     arm, motion = scene.arm, scene.motion
     turn = turn_z_to(axis)
     base = Joint("base", "revolute", turn, inverse(turn))
     coupled = tuple(replace(each, behind=each.behind + 1, leader=each.leader + 1) for each in arm.coupled)
     still = np.zeros((len(scene.time), 1))
     moved = (np.hstack([still, each]) for each in (motion.position, motion.velocity, motion.acceleration))
-    return StandingScene(
+    return Scene(
         scene.run,
         scene.time,
         Motion(*moved),
@@ -147,10 +167,19 @@ class FlexibleBase(Term):
     def columns(self, scene: Scene) -> Array:
         """Torque of the compliance at one."""
         hertz, damping, _ = self.shape
-        standing = standing_scene(scene, self.axis)
-        stiffness = standing.stiffness(hertz)
-        changed = standing.torque_on_spring(Twist(stiffness, damping / (np.pi * hertz)))
+        base = self.base_of(scene)
+        stiffness = base.stiffness(hertz)
+        changed = base.torque_on_spring(Twist(stiffness, damping / (np.pi * hertz)))
         return stiffness * changed[:, :, None]
+
+    def base_of(self, scene: Scene) -> TurningBase:
+        """The base of a scene about the axis of this shape."""
+        key = ("standing", *self.horizontal)
+        if key not in scene.derived:
+            scene.derived[key] = StandingArm.of(scene, *np.array(self.horizontal))
+        standing = scene.derived[key]
+        assert isinstance(standing, StandingArm)
+        return standing.about(self.shape[2])
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
         hertz, damping, turn = self.shape

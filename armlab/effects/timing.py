@@ -11,10 +11,9 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Effect, Parameter, Range, Scene
-from armlab.effects.sensitivity import delay_signal, directional_derivative
+from armlab.effects.sensitivity import delay_signal
 from armlab.effects.term import EveryJoint, Term, TermFamily, format_less
 from problem.arm import Arm
-from problem.motion import Motion
 
 LONGEST_SEEN = "buses, filters and logs take up to half a second"
 TIME_DELAY_FACTS = Effect(
@@ -123,11 +122,9 @@ class PositionSkew(Term):
     def columns(self, scene: Scene) -> Array:
         """Derivative of the rigid torque when this joint runs later."""
         index = self.joint - 1 if self.joint else 0
-        motion, change = scene.motion, np.zeros((3, *scene.motion.position.shape))
-        change[0, :, index] = -motion.velocity[:, index]
-        change[1, :, index] = -motion.acceleration[:, index]
-        change[2, :, index] = -np.gradient(motion.acceleration[:, index], scene.step)
-        column = directional_derivative(scene, Motion(*change))
+        velocity, acceleration = scene.motion.velocity[:, index], scene.motion.acceleration[:, index]
+        jerk = np.gradient(acceleration, scene.step)
+        column = -scene.torque_along(index, np.stack([velocity, acceleration, jerk]))
         friction = scene.torque[:, index] - scene.rigid_torque[:, index]  # follows this joint's motion, too
         column[:, index] += (delay_signal(scene, friction, SHIFTS[0]) - friction) / SHIFTS[0]
         return column[:, :, None]

@@ -26,11 +26,10 @@ from armlab.effects.contract import (
     Value,
 )
 from armlab.effects.friction import mean_within_samples, positions_within_samples
-from armlab.effects.sensitivity import directional_derivative, joint_displacement
+from armlab.effects.sensitivity import smooth_derivative
 from armlab.effects.term import EveryJoint, Term, format_number, joint_moves
 from problem.arm import Arm
 from problem.kernel import pointer
-from problem.motion import Motion
 
 DRIVE_TRAINS_SEEN = Range(
     (20.0, 2e7), "10 to 20 kN m/rad on small arms; servos of toys a thousandth, heavy arms a thousand times"
@@ -86,38 +85,73 @@ class Twist:
     gap: float = 0.0
 
 
-def felt_inertia(scene: Scene, joint: int) -> Array:
-    """Inertia that a joint (from 0) feels of the links, its rotor left out, (samples,), kg m2 (kg): above zero."""
-    inertia = scene.own_inertia[:, joint]
+@dataclass(frozen=True, eq=False)
+class Load:
+    """What a drive train carries, each (samples,). torque: N m (N). inertia: that it feels of the links, its rotor left
+    out, kg m2 (kg): above zero. slopes: by how much the torque grows with the twist and with its speed, N m/rad and
+    N m s/rad (N/m, N s/m); None for links that could not exist, which may feed a twist with energy. step: s.
+    """
+
+    step: float
+    torque: Array
+    inertia: Array
+    slopes: tuple[Array, Array] | None
+
+    def slopes_beside(self, inertia: Array, stiffness: Array | float) -> tuple[Array, Array]:
+        """The slopes in an integration with an inertia (samples,) and a stiffness.
+
+        A load undoes no more than half of a spring. Of links that could not exist the change of inertia alone counts.
+        """
+        if self.slopes is None:
+            return np.zeros(len(inertia)), np.gradient(inertia, self.step)
+        by_angle, by_speed = self.slopes
+        return np.maximum(by_angle, -0.5 * stiffness), by_speed
+
+
+def positive_inertia(inertia: Array) -> Array:
+    """Inertia of a run (samples,) where a model has too little of it or none."""
     return np.maximum(inertia, max(MIN_INERTIA_RATIO * float(np.abs(inertia).max()), 1e-9))
 
 
-def integrate_twist(scene: Scene, joint: int, law: Twist) -> Array:
-    """Twist of a joint (from 0), its speed and its acceleration, (3, samples); at rest with its load at the start."""
-    return np.asarray(integrate_twists(scene, joint, [law])[0])
+def felt_inertia(scene: Scene, joint: int) -> Array:
+    """Inertia that a joint (from 0) feels of the links, its rotor left out, (samples,), kg m2 (kg): above zero."""
+    return positive_inertia(scene.torque_by_acceleration(joint)[:, joint])
 
 
-def integrate_twists(scene: Scene, joint: int, laws: Sequence[Twist]) -> Array:
+def load_at(scene: Scene, joint: int) -> Load:
+    """The load of a joint (from 0)."""
+    slopes = None
+    if scene.has_bodies:
+        by_angle, by_speed = scene.torque_slopes(joint)
+        slopes = np.ascontiguousarray(by_angle[:, joint]), np.ascontiguousarray(by_speed[:, joint])
+    return Load(scene.step, np.ascontiguousarray(scene.rigid_torque[:, joint]), felt_inertia(scene, joint), slopes)
+
+
+def integrate_twist(load: Load, law: Twist) -> Array:
+    """Twist under a load, its speed and its acceleration, (3, samples); at rest with its load at the start."""
+    return np.asarray(integrate_twists(load, [law])[0])
+
+
+def integrate_twists(load: Load, laws: Sequence[Twist]) -> Array:
     """The same of several gaps, or of one spring, side by side: (laws, 3, samples)."""
     first = laws[0]
     slow = 0.0 if first.gap > 0 else first.stiffness / (2 * np.pi * MAX_RESONANCE_HZ) ** 2
-    inertia = np.maximum(felt_inertia(scene, joint), slow)
-    load = np.ascontiguousarray(scene.rigid_torque[:, joint])
+    inertia = np.maximum(load.inertia, slow)
     wall = 2 * np.pi * WALL_HZ
     stiffness, damping = (
         (wall**2, 2 * wall) if first.gap > 0 else (first.stiffness, first.damping_time * first.stiffness)
     )
     trains = ffi.new("DriveTrain[]", [[stiffness, damping, law.gap] for law in laws])
-    by_angle, by_speed = _load_slopes(scene, joint, inertia, stiffness * inertia if first.gap > 0 else stiffness)
-    out = np.empty((len(laws), 3, len(load)))
+    by_angle, by_speed = load.slopes_beside(inertia, stiffness * inertia if first.gap > 0 else stiffness)
+    out = np.empty((len(laws), 3, len(inertia)))
     lib.twists_of_drive_trains(
         len(laws),
         trains,
-        len(load),
-        scene.step,
-        _half_steps(scene, first, inertia),
-        pointer(load),
-        pointer(np.ascontiguousarray(inertia)),
+        len(inertia),
+        load.step,
+        _half_steps(load.step, first, inertia),
+        pointer(load.torque),
+        pointer(inertia),
         pointer(by_speed),
         pointer(by_angle),
         pointer(out),
@@ -125,25 +159,12 @@ def integrate_twists(scene: Scene, joint: int, laws: Sequence[Twist]) -> Array:
     return out
 
 
-def _load_slopes(scene: Scene, joint: int, inertia: Array, stiffness: Array | float) -> tuple[Array, Array]:
-    """By how much the load grows with the twist and with its speed, (samples,) each.
-
-    Links that could not exist may feed a twist with energy: of these only the change of the inertia counts. Nor does a
-    load undo more than half of a spring.
-    inertia: of the integration, (samples,).
-    """
-    if not scene.has_bodies:
-        return np.zeros(len(inertia)), np.gradient(inertia, scene.step)
-    by_angle, by_speed = scene.own_torque_slopes(joint)
-    return np.maximum(by_angle, -0.5 * stiffness), by_speed
-
-
-def _half_steps(scene: Scene, law: Twist, inertia: Array) -> int:
+def _half_steps(step: float, law: Twist, inertia: Array) -> int:
     """Half the steps from sample to sample that follow the fastest oscillation."""
     if law.gap > 0:
-        return int(np.ceil(scene.step * 2 * np.pi * WALL_HZ / PHASE_STEP / 2))
+        return int(np.ceil(step * 2 * np.pi * WALL_HZ / PHASE_STEP / 2))
     pitch = float(np.sqrt(law.stiffness / inertia.min()))
-    return int(np.ceil(scene.step * max(pitch, law.damping_time * pitch**2) / PHASE_STEP / 2))
+    return int(np.ceil(step * max(pitch, law.damping_time * pitch**2) / PHASE_STEP / 2))
 
 
 RIGID_HZ = 200.0  # a resonance that no recording shows: the twist follows the load at once
@@ -198,18 +219,15 @@ class Transmission(Term):
     def twist(self, scene: Scene) -> Array:
         """Twist, its speed and its acceleration for a coefficient of one, (3, samples)."""
         law, coefficient = self.law
-        return integrate_twist(scene, self.index, law) / coefficient
+        return integrate_twist(load_at(scene, self.index), law) / coefficient
 
     def columns(self, scene: Scene) -> Array:
         """Derivative of the rigid torque along the change."""
         twist, recorded = self.twist(scene), recorded_difference(scene, self.index)
         if self.measured and recorded is not None:  # zeros of the two encoders may differ
-            change = joint_displacement(scene, self.index, twist[0].mean() + recorded / self.measured)
-        else:
-            moved = np.zeros((3, *scene.motion.position.shape))
-            moved[:, :, self.index] = twist
-            change = Motion(*moved)
-        return directional_derivative(scene, change)[:, :, None]
+            moved = twist[0].mean() + recorded / self.measured
+            twist = np.stack([smooth_derivative(moved, scene.step, derivative) for derivative in range(3)])
+        return scene.torque_along(self.index, twist)[:, :, None]
 
 
 @dataclass(frozen=True)
@@ -417,13 +435,13 @@ def _resemblance(shapes: Sequence[Backlash], scenes: Sequence[Scene], residuals:
     products = np.zeros((3, len(shapes)))
     for scene, residual in zip(scenes, residuals, strict=True):
         rows = np.flatnonzero(np.isfinite(residual[:, joint]))
-        left, inertia = residual[rows, joint], felt_inertia(scene, joint)
+        left, load = residual[rows, joint], load_at(scene, joint)
         width = max(int(np.median(np.diff(rows))), 1) if len(rows) > 1 else 1
         for start in range(0, len(shapes), SIDE_BY_SIDE):
             laws, gaps = zip(*(shape.law for shape in shapes[start : start + SIDE_BY_SIDE]), strict=True)
-            twists = integrate_twists(scene, joint, laws)
+            twists = integrate_twists(load, laws)
             for place, (twist, gap) in enumerate(zip(twists, gaps, strict=True), start):
-                torque = np.convolve(inertia * (twist[2] / gap), np.full(width, 1 / width), "same")[rows]
+                torque = np.convolve(load.inertia * (twist[2] / gap), np.full(width, 1 / width), "same")[rows]
                 products[:, place] += torque @ left, torque @ torque, left @ left
     return np.asarray(np.maximum(products[0], 0) ** 2 / np.maximum(products[1] * products[2], 1e-300))
 

@@ -12,7 +12,6 @@ from scipy.interpolate import make_interp_spline
 
 from armlab.common.arrays import Array
 from armlab.effects.contract import Scene
-from armlab.effects.sensitivity import directional_derivative
 from armlab.effects.transmission import (
     WALL_HZ,
     Backlash,
@@ -21,8 +20,8 @@ from armlab.effects.transmission import (
     felt_inertia,
     integrate_twist,
     integrate_twists,
+    load_at,
 )
-from problem.motion import Motion
 
 JOINT = 1
 FINER = 8  # instants a sample: an impact is shorter than one
@@ -56,7 +55,7 @@ def torque_behind(where: Scene, law: Twist) -> Array:
         inertia = torques(now, *state, 1.0)[JOINT] - still
         return [state[1], (-still - force_of(law, inertia, *state)) / inertia]
 
-    begin = integrate_twist(where, JOINT, law)[0, 0]
+    begin = integrate_twist(load_at(where, JOINT), law)[0, 0]
     fine = np.linspace(time[0], time[-1], FINER * (len(time) - 1) + 1)
     found = solve_ivp(motion, (time[0], time[-1]), [begin, 0.0], t_eval=fine, max_step=5e-4, rtol=1e-7, atol=1e-10)
     pairs = zip(fine, found.y.T, strict=True)
@@ -81,9 +80,8 @@ def test_a_twist_to_first_order_is_the_torque_of_the_whole_arm(law: Twist) -> No
     arm = random_arm("RRR", seed=3)
     time, motor = waves(3, 2, 2.0)
     where = scene_of(arm, motor, time)
-    moved = np.zeros((3, *motor.position.shape))
-    moved[:, :, JOINT] = integrate_twist(where, JOINT, law)
-    ours, theirs = blurred(directional_derivative(where, Motion(*moved))), blurred(torque_behind(where, law))
+    twist = integrate_twist(load_at(where, JOINT), law)
+    ours, theirs = blurred(where.torque_along(JOINT, twist)), blurred(torque_behind(where, law))
     for own, truth in zip(ours.T, theirs.T, strict=True):
         assert np.std(own - truth) < 0.15 * max(np.std(truth), 0.1 * np.std(theirs[:, JOINT]))
 
@@ -100,8 +98,8 @@ def test_gaps_side_by_side_are_each_alone_to_the_bit() -> None:
     time, motor = waves(3, 2, 1.0)
     where = scene_of(random_arm("RRR", seed=3), motor, time)
     laws = [Twist(gap=gap) for gap in np.geomspace(1e-5, 1e-2, 11)]
-    together = integrate_twists(where, JOINT, laws)
-    np.testing.assert_array_equal(together, [integrate_twist(where, JOINT, law) for law in laws])
+    together = integrate_twists(load_at(where, JOINT), laws)
+    np.testing.assert_array_equal(together, [integrate_twist(load_at(where, JOINT), law) for law in laws])
 
 
 def test_a_scan_finds_the_gap_that_left_its_torque() -> None:
@@ -133,7 +131,7 @@ def test_links_that_no_arm_can_have_do_not_stop_the_integration() -> None:
     wrong = replace(where, inertial=-1e-3 * where.inertial)
     assert felt_inertia(wrong, JOINT).min() > 0
     for law in (Twist(stiffness=1e6, damping_time=3e-4), Twist(gap=1e-3)):
-        assert np.isfinite(integrate_twist(wrong, JOINT, law)).all()
+        assert np.isfinite(integrate_twist(load_at(wrong, JOINT), law)).all()
 
 
 def test_a_spring_stiffer_than_any_resonance_follows_its_load_at_once() -> None:
@@ -141,5 +139,5 @@ def test_a_spring_stiffer_than_any_resonance_follows_its_load_at_once() -> None:
     time, motor = waves(3, 2, 1.0)
     where = scene_of(arm, motor, time)
     load = where.rigid_torque[:, JOINT]
-    twist = integrate_twist(where, JOINT, Twist(stiffness=1e9, damping_time=3e-4))[0] * 1e9
+    twist = integrate_twist(load_at(where, JOINT), Twist(stiffness=1e9, damping_time=3e-4))[0] * 1e9
     np.testing.assert_allclose(twist, -load, atol=0.05 * np.abs(load).max())

@@ -12,7 +12,7 @@ from scipy.interpolate import make_interp_spline
 
 from armlab.common.arrays import Array
 from armlab.effects.contract import Scene
-from armlab.effects.soft_base import FLEXIBLE_BASE, FlexibleBase, standing_scene
+from armlab.effects.soft_base import FLEXIBLE_BASE, FlexibleBase
 from problem.arm import Arm, Joint, Link
 from problem.transforms import inverse, turn_z_to
 
@@ -72,7 +72,7 @@ def test_the_torque_of_a_base_is_that_of_the_whole_arm_on_a_spring() -> None:
     time, motion = waves(3, 2, 2.0)
     where = scene_of(upright(), motion, time)
     base = base_of(where.arm)
-    stiffness = standing_scene(where, base.axis).stiffness(HERTZ)
+    stiffness = base.base_of(where).stiffness(HERTZ)
     ours, theirs = torque_of(base, np.array([1 / stiffness]), where), torque_on_spring(where, stiffness)
     for own, truth in zip(ours[50:-50].T, theirs[50:-50].T, strict=True):
         assert np.std(own - truth) < 0.03 * np.std(truth)

@@ -150,9 +150,9 @@ def _reason_no_body(pooled: Pooled, table: ChangeTable, tested: Tested) -> str |
         changed = common.copy()
         added = body.added_body(change)
         changed[place] += 0.0 if added is None else added
-        return np.asarray(
-            np.mean([replace(each, inertial=changed).own_inertia.mean(axis=0) for each in scenes], axis=0)
-        )
+        moved = [replace(each, inertial=changed) for each in scenes]
+        means = [[each.torque_by_acceleration(of)[:, of].mean() for of in range(len(each.arm))] for each in moved]
+        return np.asarray(np.mean(means, axis=0))
 
     bare = inertia(np.zeros(body.size)) + _rotors(pooled)
     slopes = np.stack([inertia(unit) + _rotors(pooled) - bare for unit in np.eye(body.size)], axis=-1)
