@@ -19,6 +19,7 @@ USUAL_SHARE = 0.9  # of the rows, whose values are usual
 USUAL_STEP_SHARE, MAX_USUAL_STEPS = 0.98, 3.0  # of the steps are usual ones; a longer one than three of them is a jump
 BEYOND_LIMITS = 10.0  # times a limit: no arm is there
 BEYOND_USUAL, BEYOND_LEAST = 1e3, 1e3  # times the usual size, and in SI units at least: no sensor reads so (by eye)
+HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)  # 2**64 over the golden ratio: its multiples lie far apart
 
 
 def required_names(run: MotionRun) -> tuple[str, str]:
@@ -169,19 +170,25 @@ def duplicated_rows(signals: Sequence[Array]) -> NDArray[np.bool_]:
 
     Rows are compared by a hash first, so that memory holds one number a row.
     """
-    import pandas as pd
-
     columns = [column for signal in signals for column in (signal[:, None] if signal.ndim == 1 else signal).T]
     keys = np.zeros(len(columns[0]), dtype=np.uint64)
     for column in columns:
-        keys *= np.uint64(0x9E3779B97F4A7C15)
-        keys += pd.util.hash_array(column + 0.0)  # -0.0 equals 0.0
+        keys ^= keys >> np.uint64(29)
+        keys *= HASH_FACTOR
+        keys += _bits(column)
     same = np.zeros(len(keys), dtype=bool)
-    if np.any(np.diff(np.sort(keys)) == 0):
-        suspects = np.flatnonzero(pd.Series(keys).duplicated(keep=False))
-        rows = pd.DataFrame({place: column[suspects] for place, column in enumerate(columns)})
-        same[suspects] = rows.duplicated()
+    _, kinds, counts = np.unique(keys, return_inverse=True, return_counts=True)
+    suspects = np.flatnonzero(counts[kinds] > 1)
+    if len(suspects):
+        same[suspects] = True
+        rows = np.column_stack([_bits(column[suspects]) for column in columns])
+        same[suspects[np.unique(rows, axis=0, return_index=True)[1]]] = False
     return same
+
+
+def _bits(column: Array) -> NDArray[np.uint64]:
+    """The same for equal numbers: -0.0 equals 0.0, and a missing number another one."""
+    return np.where(np.isnan(column), np.nan, column + 0.0).view(np.uint64)
 
 
 def fill_optional_signals(run: AnyRun) -> AnyRun:
