@@ -89,17 +89,29 @@ class Columns:
         return np.column_stack([own[-1] for own in self.parts])
 
 
-def filtered_columns(candidate: Candidate, scenes: Sequence[Scene], observed: Observed, same_filter: bool) -> Array:
-    """A candidate's columns through the filter of the torque, (kept rows, rows of the candidate, coefficients)."""
-    parts = []
+def filtered_columns(
+    candidates: Sequence[Candidate], scenes: Sequence[Scene], observed: Observed, same_filter: bool
+) -> list[Array]:
+    """Candidates' columns through the filter of the torque, (kept rows, rows of the candidate, coefficients) each."""
+    parts: list[list[Array]] = [[] for _ in candidates]
     for scene, signals in zip(scenes, observed.signals, strict=True):
-        columns = candidate.columns(scene)
-        blind = [number for number, joint in enumerate(candidate.rows) if joint in scene.arm.unmeasured]
-        if blind:
-            columns = columns.copy()
-            columns[:, blind] = 0.0
-        parts.append(signals.filter(columns) if same_filter else columns[signals.filter.rows])
-    return np.concatenate(parts)
+        made = [_seen_columns(each, scene) for each in candidates]
+        side_by_side = np.concatenate([each.reshape(len(each), -1).T for each in made]).T  # each column in one piece
+        passed = signals.filter(side_by_side) if same_filter else side_by_side[signals.filter.rows]
+        ends = np.cumsum([each[0].size for each in made])
+        for part, each, own in zip(parts, made, np.split(passed, ends[:-1], axis=1), strict=True):
+            part.append(own.reshape(-1, *each.shape[1:]))
+    return [np.concatenate(part) for part in parts]
+
+
+def _seen_columns(candidate: Candidate, scene: Scene) -> Array:
+    """A candidate's columns, zero at joints whose torque is not measured, (samples, rows, coefficients)."""
+    columns = candidate.columns(scene)
+    blind = [number for number, joint in enumerate(candidate.rows) if joint in scene.arm.unmeasured]
+    if blind:
+        columns = columns.copy()
+        columns[:, blind] = 0.0
+    return columns
 
 
 def base_columns(arm: Arm, base: BaseParameters, runs: Sequence[Signals]) -> list[Array]:
@@ -196,9 +208,11 @@ def compute_moments(columns: Columns, noise: Noise, observed: Observed) -> Momen
         rows.append(identify[1])
     lengths = np.sqrt(np.diag(gram)[:-1])
     scale = np.append(np.where(lengths > SHORTEST_COLUMN, lengths, 1.0), 1.0)
-    gram /= np.outer(scale, scale)
-    scaled = tuple(each / np.outer(scale[own], scale[own]) for each, own in zip(heldout, columns.index, strict=True))
-    return Moments(gram, scale[:-1], scaled, columns.index, tuple(rows))
+    everything = np.arange(len(scale))
+    for each, own in zip((gram, *heldout), (everything, *columns.index), strict=True):
+        each *= 1 / scale[own]
+        each *= 1 / scale[own, None]
+    return Moments(gram, scale[:-1], tuple(heldout), columns.index, tuple(rows))
 
 
 def _gram(white: Array) -> tuple[Array, int]:

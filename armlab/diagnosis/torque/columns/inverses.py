@@ -1,7 +1,7 @@
-"""Inverses of the small symmetric matrices that a search asks for thousands of times."""
+"""Inverses and solutions of the symmetric matrices that a search asks for thousands of times."""
 
 import numpy as np
-from scipy.linalg.lapack import dpocon, dpotrf, dpotri
+from scipy.linalg.lapack import dpocon, dposv, dpotrf, dpotri
 
 from armlab.common.arrays import Array
 
@@ -28,6 +28,14 @@ def pseudo_inverse_of(matrix: Array) -> Array:
     if not failed and dpocon(factor, np.linalg.norm(matrix, 1), uplo="L")[0] > LEAST_RATIO:
         return _inverse_from(factor)
     return np.asarray(np.linalg.pinv(matrix, rcond=LEAST_RATIO, hermitian=True))
+
+
+def solve_positive(matrix: Array, towards: Array) -> Array:
+    """What a symmetric positive definite matrix makes `towards` of; the shortest of all where it is singular."""
+    if not len(matrix):
+        return towards
+    _, solved, failed = dposv(matrix, towards, lower=1)
+    return np.asarray(np.linalg.lstsq(matrix, towards)[0] if failed else solved)
 
 
 def _inverse_from(factor: Array) -> Array:

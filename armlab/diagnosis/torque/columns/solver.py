@@ -128,9 +128,12 @@ class Solver:
     @cached_property
     def ranks(self) -> NDArray[np.intp]:
         """Independent columns of each group."""
-        blocks = [self.moments.gram[np.ix_(each.columns, each.columns)] for each in self.groups]
-        share = self.tuning.min_unabsorbed_share
-        return np.array([_numerical_rank(block, share) for block in blocks], dtype=np.intp)
+        out = np.zeros(len(self.groups), dtype=np.intp)
+        for numbers, offered in self._by_width.values():
+            values = np.linalg.eigvalsh(self.moments.gram[offered[:, :, None], offered[:, None, :]])
+            least = self.tuning.min_unabsorbed_share * np.maximum(values[:, -1:], 1e-300)
+            out[numbers] = np.sum(values > least, axis=1)
+        return out
 
     def _price(self, number: int, group: Group) -> float:
         rows = sum(self.moments.rows[row] for row in group.candidate.rows)
@@ -358,8 +361,3 @@ class Solver:
         """A group's coefficients of unscaled columns."""
         columns = self.groups[group].columns
         return np.asarray(fit.coefficients[columns] / self.moments.lengths[columns])
-
-
-def _numerical_rank(gram: Array, least_share: float) -> int:
-    values = np.linalg.eigvalsh(gram)
-    return int(np.sum(values > least_share * max(values[-1], 1e-300)))

@@ -26,7 +26,7 @@ from armlab.effects.links import (
     felt_by_ten,
     pseudo_inertia_parts,
 )
-from problem.pseudo_inertia import parameters_of, pseudo_inertias
+from problem.pseudo_inertia import pseudo_inertias
 
 BALL_MASS = 10.0  # kg, where the search for a body begins
 MAX_NEWTON_STEPS, MIN_STEP_SHARE = 100, 1e-9
@@ -239,17 +239,16 @@ def _split_among_bodies(model: FittedModel) -> Array:
     for _ in range(MAX_PROJECTIONS):
         if all(is_possible_body(each, 0.0) for each in (split / units).reshape(-1, 10)):
             break
-        bodies = np.concatenate([_nearest_body(each) for each in split.reshape(-1, 10)])
-        split = start + unfelt @ (bodies - start)
+        split = start + unfelt @ (_nearest_bodies(split.reshape(-1, 10)).ravel() - start)
     found[off] = (split / units).reshape(-1, 10)
     return found
 
 
-def _nearest_body(ten: Array) -> Array:
-    """The body nearest to ten parameters in kilograms, with a little spread in every direction."""
-    values, vectors = np.linalg.eigh(pseudo_inertias(ten)[0])
-    least = LEAST_SPREAD * float(values[-1])
-    return parameters_of(((vectors * np.maximum(values, least)) @ vectors.T)[None])
+def _nearest_bodies(tens: Array) -> Array:
+    """The bodies nearest to parameters in kilograms, (bodies, 10), with a little spread in every direction."""
+    values, vectors = np.linalg.eigh(pseudo_inertias(tens.ravel()))
+    raised = np.maximum(values, LEAST_SPREAD * values[:, -1:])
+    return np.asarray(_ten_of((vectors * raised[:, None, :]) @ vectors.transpose(0, 2, 1)) * KILOGRAMS)
 
 
 def predicts_as_well(error: Array, other: Array, tolerance: float) -> bool:

@@ -12,7 +12,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.torque.columns.blocks import WhitenedRows, whitened_rows
@@ -159,7 +158,7 @@ def _design_at(
     observed = observe(runs, design.simulation.arm, design.simulation.inertial, settings)
     fresh = build_design_matrix(observed, design.simulation, design.base, design.prior, settings)
     moved = follow_model(replace(fresh, offsets=design.offsets), model)
-    return replace(moved, blocks=tuple(moved.block(each, 0) for each in candidates))
+    return replace(moved, blocks=tuple(moved.blocks_of([(each, 0) for each in candidates])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,13 +262,14 @@ class _Trial:
         return prior_precision(self.model.solver, everything, self.rows.designs[0].shape[1])
 
     @cached_property
-    def _products(self) -> list[list[tuple[NDArray[np.intp], Array]]]:
-        """Per joint and fold the own columns and their products, the torque last."""
+    def _products(self) -> list[tuple[NDArray[np.intp], Array]]:
+        """Per joint the own columns and their products on each fold, (folds, columns + 1, columns + 1), torque last."""
         out = []
         for design, target, fold in zip(self.judged.designs, self.judged.errors, self.judging, strict=True):
             used = np.flatnonzero(np.any(design != 0, axis=0))
             both = np.column_stack([design[:, used], target])
-            out.append([(used, both[fold == number].T @ both[fold == number]) for number in range(self._folds)])
+            parts = (both[fold == number] for number in range(self._folds))
+            out.append((used, np.stack([part.T @ part for part in parts])))
         return out
 
     def errors(self, state: State) -> Array:
@@ -278,17 +278,14 @@ class _Trial:
         rank = self.model.solver.fit(self.begin).links.shape[1]
         own = [np.arange(rank), *(self._columns(group, rank) for group in state.groups)]
         columns = np.concatenate(own).astype(np.intp)
-        out = np.empty((len(grams), len(self._products)))
-        for number in range(len(grams)):
-            gram = grams[number][np.ix_(columns, columns)]
-            values = np.zeros(grams.shape[1])
-            if len(columns):
-                values[columns] = cho_solve(cho_factor(gram, lower=True), products[number][columns])
-            for joint, parts in enumerate(self._products):
-                used, judged = parts[number]
-                full = np.append(-values[used], 1.0)
-                out[number, joint] = full @ judged @ full
-        return out
+        values = np.zeros(products.shape)
+        own_grams = grams[:, columns[:, None], columns]
+        values[:, columns] = np.linalg.solve(own_grams, products[:, columns, None])[:, :, 0]
+        out = []
+        for used, judged in self._products:
+            full = np.column_stack([-values[:, used], np.ones(len(values))])[:, :, None]
+            out.append((full.transpose(0, 2, 1) @ judged @ full)[:, 0, 0])
+        return np.column_stack(out)
 
     def _columns(self, group: int, rank: int) -> NDArray[np.intp]:
         return self.model.solver.groups[group].columns - len(self.model.design.base) + rank

@@ -14,6 +14,7 @@ from scipy.signal import bilinear, lfilter
 
 from armlab.common.arrays import Array
 from armlab.common.dahl import dahl_state
+from armlab.diagnosis.torque.columns.inverses import solve_positive
 from armlab.diagnosis.torque.rows.data import Observed
 from armlab.diagnosis.tuning import SurrogateTuning
 
@@ -22,13 +23,17 @@ Part = tuple[Array, tuple[str, ...]]
 
 @dataclass(frozen=True, eq=False)
 class Grams:
-    """Products of features, (features, features), of each third of the rows."""
+    """Products of features, (features, features), of each third of the rows.
+
+    asked_often: for many residuals, so that their axes pay: these take the time of twenty ridges.
+    """
 
     thirds: tuple[Array, ...]
+    asked_often: bool = False
 
     @cached_property
     def axes(self) -> tuple[tuple[Array, Array], ...]:
-        """Eigenvalues and eigenvectors of what each third leaves: of many features they take most of the time."""
+        """Eigenvalues and eigenvectors of what each third leaves."""
         whole = np.sum(self.thirds, axis=0)
         return tuple((values, vectors) for values, vectors in (np.linalg.eigh(whole - own) for own in self.thirds))
 
@@ -41,12 +46,25 @@ class Grams:
         count = len(products[0])
         ridges = 10.0 ** np.array(exponents) * sum(float(np.trace(gram)) for gram in self.thirds) / max(count, 1)
         towards, errors = np.sum(products, axis=0), np.zeros(len(ridges))
-        for own, product, (values, vectors) in zip(self.thirds, products, self.axes, strict=True):
-            turned = vectors.T @ (towards - product)
-            weights = vectors @ (turned[:, None] / (np.maximum(values, 0)[:, None] + ridges))
+        for number, (own, product) in enumerate(zip(self.thirds, products, strict=True)):
+            weights = self._weights_without(number, towards - product, ridges)
             errors += np.sum(weights * (own @ weights), axis=0) - 2 * product @ weights
         best = float(ridges[int(np.argmin(errors))])
-        return best, np.linalg.solve(np.sum(self.thirds, axis=0) + best * np.eye(count), towards)
+        return best, solve_positive(np.sum(self.thirds, axis=0) + best * np.eye(count), towards)
+
+    def weights_in_turn(self, products: Sequence[Array], ridge: float) -> Array:
+        """The weights with a ridge on all rows but each third, (features, thirds)."""
+        towards, ridges = np.sum(products, axis=0), np.array([ridge])
+        parts = (self._weights_without(number, towards - each, ridges) for number, each in enumerate(products))
+        return np.column_stack(list(parts))
+
+    def _weights_without(self, third: int, towards: Array, ridges: Array) -> Array:
+        """The weights with each ridge on all rows but a third, (features, ridges)."""
+        if self.asked_often:
+            values, vectors = self.axes[third]
+            return np.asarray(vectors @ ((vectors.T @ towards)[:, None] / (np.maximum(values, 0)[:, None] + ridges)))
+        gram, unit = np.sum(self.thirds, axis=0) - self.thirds[third], np.eye(len(towards))
+        return np.column_stack([solve_positive(gram + ridge * unit, towards) for ridge in ridges])
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.torque.columns.blocks import HeldOutGain, block_numbers, held_out_gain
+from armlab.diagnosis.torque.columns.inverses import solve_positive
 from armlab.diagnosis.torque.rows.data import Observed, Segment, rows_in
 from armlab.diagnosis.torque.rows.features import Features, Grams
 from armlab.diagnosis.torque.rows.noise import Noise
@@ -43,7 +44,7 @@ def predict_in_turn(
     out = np.empty(len(thirds))
     for fold in range(3):
         gram = np.sum(grams, axis=0) - grams[fold] + ridge * np.eye(values.shape[1])
-        weights = np.linalg.solve(gram, np.sum(products, axis=0) - products[fold])
+        weights = solve_positive(gram, np.sum(products, axis=0) - products[fold])
         out[thirds == fold] = values[rows][thirds == fold] @ weights
     return out
 
@@ -59,8 +60,7 @@ def errors_in_turn(
     """Errors of each third where the others have been learnt from, (rows,)."""
     out, whole, towards = target.copy(), np.sum(grams, axis=0), np.sum(products, axis=0)
     for own, gram, product in zip(thirds, grams, products, strict=True):
-        weights = np.linalg.solve(whole - gram + ridge * np.eye(len(whole)), towards - product)
-        out[own] -= white[own] @ weights
+        out[own] -= white[own] @ solve_positive(whole - gram + ridge * np.eye(len(whole)), towards - product)
     return out
 
 
@@ -76,7 +76,8 @@ class FoldedFeatures:
 def fold_features(made: Features, observed: Observed, joint: int, tuning: SurrogateTuning) -> FoldedFeatures:
     """Features of a joint (from 0), with their products third by third."""
     thirds = time_thirds(observed, joint, tuning)
-    grams = Grams(tuple(made.values[thirds == fold].T @ made.values[thirds == fold] for fold in range(3)))
+    parts = (made.values[thirds == fold] for fold in range(3))
+    grams = Grams(tuple(part.T @ part for part in parts), asked_often=True)
     return FoldedFeatures(replace(made, grams=grams), thirds, grams)
 
 
@@ -102,15 +103,14 @@ def predict_structure(
     residual: Array, joint: int, made: FoldedFeatures, observed: Observed, tuning: SurrogateTuning
 ) -> Array:
     """What the features predict of a residual (rows,), zeros unless they do so on held-out rows, too."""
-    values = made.features.values
-    products = tuple(values[made.folds == fold].T @ residual[made.folds == fold] for fold in range(3))
+    values, folds = made.features.values, made.folds
+    products = tuple((values.T @ np.where(folds[:, None] == range(3), residual[:, None], 0.0)).T)
     ridge, weights = made.grams.best_ridge(products, tuning.ridge_exponents)
-    predicted = values @ weights
+    predicted, *in_turn = (values @ np.column_stack([weights, made.grams.weights_in_turn(products, ridge)])).T
     rows = rows_in(observed.of_role("validate", joint), observed.rows)
-    numbers, learn = block_numbers(observed, tuning.block_s, tuning.min_blocks), made.folds >= 0
+    numbers, learn = block_numbers(observed, tuning.block_s, tuning.min_blocks), folds >= 0
     validated = held_out_gain(residual[rows], residual[rows] - predicted[rows], numbers[rows])
-    thirds = [made.folds[learn] == fold for fold in range(3)]
-    turned = errors_in_turn(values[learn], residual[learn], thirds, ridge, made.grams.thirds, products)
+    turned = residual[learn] - np.choose(folds[learn], [each[learn] for each in in_turn])
     inside = held_out_gain(residual[learn], turned, numbers[learn])
     gains = (validated, inside)
     sure = any(each.share > tuning.min_noise_gain and each.chance < tuning.noise_level for each in gains)
@@ -278,7 +278,7 @@ def _important_variables(
 
     def gain(kept: NDArray[np.bool_]) -> float:
         own = gram[np.ix_(kept, kept)] + ridge * np.eye(int(kept.sum()))
-        weights = np.linalg.solve(own, products[kept])
+        weights = solve_positive(own, products[kept])
         return 1 - float(np.sum((target - columns[:, kept] @ weights) ** 2)) / power
 
     whole, lost = gain(np.ones(len(products), dtype=bool)), {}
