@@ -20,7 +20,7 @@ from armlab.common.arrays import Array
 from armlab.proof.blind.arms import make_machine
 from armlab.proof.blind.formats import Truth
 from armlab.proof.blind.score import held_out
-from armlab.proof.blind.score.cases import MISSING_VERDICT, JudgedCase
+from armlab.proof.blind.score.cases import MISSING_VERDICT, STEPS_FILE, JudgedCase
 from armlab.proof.blind.score.figures import draw_confusion, draw_figures
 from armlab.proof.blind.score.gallery import CASES_PER_GROUP, choose_items, tally_outcomes, write_gallery
 from armlab.proof.blind.score.held_out import Gap, HeldOut, filter_held_out_run, measure_gap_closed, rms
@@ -83,6 +83,25 @@ def test_each_miss_has_a_row_that_says_what_was_hidden_and_what_was_said() -> No
     missed = table.iloc[0]
     assert (missed["effect"], missed["law"], missed["joint"], missed["limits"]) == ("coulomb_friction", "x", 2, 8.0)
     assert (missed["hidden"], missed["said"]) == ("coulomb_friction, joint 2, 8.0 limits", "backlash, joint 3 [wrong]")
+
+
+@pytest.mark.parametrize(
+    ("steps", "why"),
+    [
+        (["+ payload 2"], "never in a model"),
+        (["+ coulomb_friction 2", "- coulomb_friction 2"], "taken out by the search"),
+        (
+            ["+ coulomb_friction 2", "coulomb_friction 2 -> friction_curve 2 (3,)"],
+            "friction_curve 2 (3,) took its place",
+        ),
+        (["withdrawn: coulomb_friction 2: p = 0.2", "+ coulomb_friction 21"], "p = 0.2"),
+        (["friction_curve 2 -> coulomb_friction 2"], "in the model, not told"),
+    ],
+)
+def test_a_miss_says_what_the_diagnosis_did_with_it_last(tmp_path: Path, steps: list[str], why: str) -> None:
+    (tmp_path / STEPS_FILE).write_text(json.dumps({"steps": [{"what": each} for each in steps]}))
+    case = replace(judged(COULOMB, verdict()), folder=tmp_path)
+    assert list_misses([case], make_rows([case]))["why"].tolist() == [why]
 
 
 def test_answers_and_verdicts_in_words() -> None:

@@ -17,6 +17,7 @@ from armlab.common.errors import InputError
 from armlab.proof.blind.formats import LinkDeviation, TrueEffect, Truth, read_model
 
 FAILURE_FILE = "failed.txt"  # in the place of a verdict: the error message of a diagnosis that failed
+STEPS_FILE = "steps.json"  # beside a verdict: the moves and tests of the diagnosis
 TIME_FILE = "time.json"  # beside a verdict: how long the diagnosis took; written last, when the verdict is complete
 UNKNOWN_NAME = "unknown"  # of a finding without a name
 VALID_STATUSES = ("mismatch", "none", "inconclusive")

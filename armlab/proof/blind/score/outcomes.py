@@ -15,7 +15,7 @@ import pandas as pd
 from armlab.proof.blind.score.cases import JudgedCase
 from armlab.proof.blind.score.measures import MIN_NAMED_MULTIPLE
 from armlab.proof.blind.score.rows import ScoreRows, to_records
-from armlab.proof.blind.score.words import describe_hidden, describe_said, name_hidden, name_said
+from armlab.proof.blind.score.words import describe_hidden, describe_loss, describe_said, name_hidden, name_said
 
 
 @dataclass(frozen=True)
@@ -109,6 +109,7 @@ MISS_COLUMNS = [
     "joint",
     "limits",
     "answered",
+    "why",
 ]
 
 SHOWN_GAP_COLUMNS = ["gap_closed", "gap_closed_beyond_friction"]
@@ -125,7 +126,8 @@ def list_misses(cases: Sequence[JudgedCase], table: ScoreRows) -> pd.DataFrame:
     """A row a miss, in the order of the groups, then of the cases.
 
     effect, joint: what was missed, or what was wrongly claimed. law: of a missed effect. answered: what was said of a
-    missed effect, or how a wrong claim was counted. hidden, said: of the whole case, in words. Gaps: see `gap`.
+    missed effect, or how a wrong claim was counted. why: what the diagnosis did with a missed effect. hidden, said: of
+    the whole case, in words. Gaps: see `gap`.
     """
     found = list_outcomes(table)
     failures = [group for group, about in OUTCOME_GROUPS.items() if not about.success]
@@ -138,6 +140,10 @@ def list_misses(cases: Sequence[JudgedCase], table: ScoreRows) -> pd.DataFrame:
     for column, words in WORD_COLUMNS.items():
         found[column] = [words(case) for case in own]
     found["law"] = [_hidden_law(case, effect) for case, effect in zip(own, found["effect"], strict=True)]
+    rows = zip(own, found["miss"], found["effect"], found["joint"], strict=True)
+    found["why"] = [
+        describe_loss(case, effect, joint) if miss == "missed" else "" for case, miss, effect, joint in rows
+    ]
     found = found.merge(table.cases[["case", "arm", "noise", *SHOWN_GAP_COLUMNS]], on="case", how="left")
     return found[[*MISS_COLUMNS, *SHOWN_GAP_COLUMNS, *WORD_COLUMNS]]
 

@@ -23,7 +23,7 @@ STRICTER_MEASURES = {  # shown below the measure that is wanted: the same, count
     "gap_closed": "gap_closed_beyond_friction",
 }
 MAX_SHOWN_MISSES = 30
-SHOWN_MISS_COLUMNS = ["miss", "case", "tier", "arm", "effect", "law", "joint", "limits", "hidden", "said"]
+SHOWN_MISS_COLUMNS = ["miss", "case", "tier", "arm", "effect", "law", "joint", "limits", "hidden", "said", "why"]
 HOW_TO_READ = f"""\
 A *detection limit* is the size at which an oracle that knows the true law and the true noise finds the effect with 90 %
 power, at a level of 1 % over all effects and places. A diagnosis that does not know the law needs more: names are
@@ -193,7 +193,7 @@ def _misses_section(missed: pd.DataFrame) -> str:
     more = f"The first {MAX_SHOWN_MISSES} of {len(missed)}" if len(missed) > MAX_SHOWN_MISSES else f"All {len(missed)}"
     text = (
         f"{more}. Effect and joint are what was missed or wrongly claimed. *Hidden* and *said* describe the whole "
-        "case without right findings of the background. Noise, gap closed and all sizes are in "
-        "[misses.csv](misses.csv)."
+        "case without right findings of the background. *Why* is the last that the diagnosis did with a missed "
+        "effect. Noise, gap closed and all sizes are in [misses.csv](misses.csv)."
     )
     return f"{text}\n\n{_frame_table(missed.head(MAX_SHOWN_MISSES)[SHOWN_MISS_COLUMNS])}"

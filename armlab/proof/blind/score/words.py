@@ -1,10 +1,15 @@
 """Answers and verdicts in words, side by side."""
 
+import json
+import re
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from armlab.proof.blind.formats import InjectedEffect
-from armlab.proof.blind.score.cases import JudgedCase, categorize_finding, read_complaint
+from armlab.proof.blind.score.cases import STEPS_FILE, JudgedCase, categorize_finding, read_complaint
 
 
 def describe_hidden(case: JudgedCase) -> str:
@@ -78,6 +83,28 @@ def describe_finding(finding: dict[str, Any], what: str) -> str:
     text = f"{finding['effect']}, {describe_place(finding['joint'])}" + (f": {', '.join(sizes)}" if sizes else "")
     text += f" (or {', '.join(rivals)})" if rivals else ""
     return f"{text}{_category_mark(what)}"
+
+
+def describe_loss(case: JudgedCase, effect: str, joint: Any) -> str:
+    """What the diagnosis did with an effect that it does not name: the last step that speaks of it at its joint."""
+    place = "" if pd.isna(joint) else f" {int(joint)}"
+    about = re.compile(rf"\b{effect}{place}\b")
+    steps = [each["what"] for each in _read_steps(case.folder) if about.search(each["what"])]
+    if not steps:
+        return "never in a model"
+    last = str(steps[-1])
+    if last.startswith(("+", "-")):
+        return "in the model, not told" if last.startswith("+") else "taken out by the search"
+    if " -> " in last:
+        after = last.partition(" -> ")[2]
+        return "in the model, not told" if about.search(after) else f"{after} took its place"
+    return last.partition(": ")[2].partition(": ")[2] or last
+
+
+def _read_steps(folder: Path) -> list[dict[str, Any]]:
+    """The moves and tests of a diagnosis, none where it failed."""
+    path = folder / STEPS_FILE
+    return list(json.loads(path.read_text(encoding="utf-8"))["steps"]) if path.is_file() else []
 
 
 def describe_place(joint: Any) -> str:
