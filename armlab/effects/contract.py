@@ -263,6 +263,11 @@ class Candidate(ABC):
     def columns(self, scene: Scene) -> Array:
         """Torque for each coefficient at one: (samples, len(rows), coefficients), N m (N)."""
 
+    @classmethod
+    def columns_together(cls, candidates: Sequence["Candidate"], scene: Scene) -> list[Array]:
+        """The columns of several candidates of this class; where they share work, in less time."""
+        return [each.columns(scene) for each in candidates]
+
     @abstractmethod
     def with_shape(self, shape: tuple[float, ...]) -> "Candidate":
         """The same law at the same place with other nonlinear parameters."""

@@ -7,7 +7,7 @@ is integrated in time.
 """
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -223,7 +223,10 @@ class Transmission(Term):
 
     def columns(self, scene: Scene) -> Array:
         """Derivative of the rigid torque along the change."""
-        twist, recorded = self.twist(scene), recorded_difference(scene, self.index)
+        return self._columns_of(self.twist(scene), scene)
+
+    def _columns_of(self, twist: Array, scene: Scene) -> Array:
+        recorded = recorded_difference(scene, self.index)
         if self.measured and recorded is not None:  # zeros of the two encoders may differ
             moved = twist[0].mean() + recorded / self.measured
             twist = np.stack([smooth_derivative(moved, scene.step, derivative) for derivative in range(3)])
@@ -290,6 +293,18 @@ class Backlash(Transmission):
     def law(self) -> tuple[Twist, float]:
         """The play, and its gap."""
         return Twist(gap=self.shape[0]), self.shape[0]
+
+    @classmethod
+    def columns_together(cls, candidates: Sequence[Candidate], scene: Scene) -> list[Array]:
+        """Those of gaps of a joint: all are integrated side by side."""
+        gaps = [each for each in candidates if isinstance(each, cls)]
+        out: dict[Candidate, Array] = {}
+        for index in sorted({each.index for each in gaps}):
+            own = [each for each in gaps if each.index == index]
+            twists = _integrate_side_by_side(load_at(scene, index), [each.law[0] for each in own])
+            columns = (each._columns_of(twist / each.law[1], scene) for each, twist in zip(own, twists, strict=True))
+            out |= zip(own, columns, strict=True)
+        return [out[each] for each in candidates]
 
     @classmethod
     def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
@@ -422,6 +437,12 @@ class BacklashFamily(EveryJoint):
         ]
 
 
+def _integrate_side_by_side(load: Load, laws: Sequence[Twist]) -> Iterator[Array]:
+    """Twists of gaps, (3, samples) each: some at a time."""
+    for start in range(0, len(laws), SIDE_BY_SIDE):
+        yield from integrate_twists(load, laws[start : start + SIDE_BY_SIDE])
+
+
 def recorded_difference(scene: Scene, joint: int) -> Array | None:
     """Link angle less motor angle, (samples,), less their mean; None where it was not recorded."""
     if scene.link_position is None:
@@ -437,12 +458,10 @@ def _resemblance(shapes: Sequence[Backlash], scenes: Sequence[Scene], residuals:
         rows = np.flatnonzero(np.isfinite(residual[:, joint]))
         left, load = residual[rows, joint], load_at(scene, joint)
         width = max(int(np.median(np.diff(rows))), 1) if len(rows) > 1 else 1
-        for start in range(0, len(shapes), SIDE_BY_SIDE):
-            laws, gaps = zip(*(shape.law for shape in shapes[start : start + SIDE_BY_SIDE]), strict=True)
-            twists = integrate_twists(load, laws)
-            for place, (twist, gap) in enumerate(zip(twists, gaps, strict=True), start):
-                torque = np.convolve(load.inertia * (twist[2] / gap), np.full(width, 1 / width), "same")[rows]
-                products[:, place] += torque @ left, torque @ torque, left @ left
+        laws, gaps = zip(*(shape.law for shape in shapes), strict=True)
+        for place, (twist, gap) in enumerate(zip(_integrate_side_by_side(load, laws), gaps, strict=True)):
+            torque = np.convolve(load.inertia * (twist[2] / gap), np.full(width, 1 / width), "same")[rows]
+            products[:, place] += torque @ left, torque @ torque, left @ left
     return np.asarray(np.maximum(products[0], 0) ** 2 / np.maximum(products[1] * products[2], 1e-300))
 
 

@@ -110,9 +110,10 @@ def choose_cutoff_hz(arm: Arm, runs: Sequence[Run]) -> float:
 
     Raises ValueError for too little motion.
     """
-    held_out = HeldOutBlocks.of(runs)
+    held_out, fits = HeldOutBlocks.of(runs), dict[float, Predict]()
     while True:
-        scores = [np.mean(_plain_scores(arm, held_out, each)) for each in held_out.low_passes_hz]
+        fits |= {each: _fit_plain(arm, held_out, each) for each in held_out.low_passes_hz if each not in fits}
+        scores = [np.mean(held_out.scores(fits[each])) for each in held_out.low_passes_hz]
         best = held_out.low_passes_hz[int(np.argmin(scores))]
         higher = held_out.up_to(STEP * best)
         if higher is held_out:
@@ -120,8 +121,8 @@ def choose_cutoff_hz(arm: Arm, runs: Sequence[Run]) -> float:
         held_out = higher
 
 
-def _plain_scores(arm: Arm, held_out: HeldOutBlocks, cutoff_hz: float) -> Array:
-    """Of plain least squares behind a cut-off, (blocks,)."""
+def _fit_plain(arm: Arm, held_out: HeldOutBlocks, cutoff_hz: float) -> Predict:
+    """Plain least squares behind a cut-off, without each block."""
     filters = [TrimmedButterworth.possible(run, cutoff_hz) for run in held_out.runs]
     motions = [smooth_motion(run, low_pass) for run, low_pass in zip(held_out.runs, filters, strict=True)]
     top_speed = np.max([np.abs(motion.velocity).max(axis=0) for motion in motions], axis=0)
@@ -140,7 +141,7 @@ def _plain_scores(arm: Arm, held_out: HeldOutBlocks, cutoff_hz: float) -> Array:
         left_out: sum_equations([each for number, each in sums.items() if number != left_out]).solve()[0]
         for left_out in held_out.numbers
     }
-    return held_out.scores(lambda number, place, part: layout.matrix(_part(motions[place], part)) @ fitted[number])
+    return lambda number, place, part: layout.matrix(_part(motions[place], part)) @ fitted[number]
 
 
 def _part(motion: Motion, part: slice) -> Motion:

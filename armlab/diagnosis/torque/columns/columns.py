@@ -95,7 +95,7 @@ def filtered_columns(
     """Candidates' columns through the filter of the torque, (kept rows, rows of the candidate, coefficients) each."""
     parts: list[list[Array]] = [[] for _ in candidates]
     for scene, signals in zip(scenes, observed.signals, strict=True):
-        made = [_seen_columns(each, scene) for each in candidates]
+        made = _seen_columns(candidates, scene)
         side_by_side = np.concatenate([each.reshape(len(each), -1).T for each in made]).T  # each column in one piece
         passed = signals.filter(side_by_side) if same_filter else side_by_side[signals.filter.rows]
         ends = np.cumsum([each[0].size for each in made])
@@ -104,10 +104,19 @@ def filtered_columns(
     return [np.concatenate(part) for part in parts]
 
 
-def _seen_columns(candidate: Candidate, scene: Scene) -> Array:
-    """A candidate's columns, zero at joints whose torque is not measured, (samples, rows, coefficients)."""
-    columns = candidate.columns(scene)
-    blind = [number for number, joint in enumerate(candidate.rows) if joint in scene.arm.unmeasured]
+def _seen_columns(candidates: Sequence[Candidate], scene: Scene) -> list[Array]:
+    """Candidates' columns, zero at joints whose torque is not measured, (samples, rows, coefficients) each."""
+    kinds: dict[type[Candidate], list[int]] = {}
+    for number, candidate in enumerate(candidates):
+        kinds.setdefault(type(candidate), []).append(number)
+    made: dict[int, Array] = {}
+    for kind, own in kinds.items():
+        made |= zip(own, kind.columns_together([candidates[number] for number in own], scene), strict=True)
+    return [_without_unmeasured(made[number], each, scene.arm) for number, each in enumerate(candidates)]
+
+
+def _without_unmeasured(columns: Array, candidate: Candidate, arm: Arm) -> Array:
+    blind = [number for number, joint in enumerate(candidate.rows) if joint in arm.unmeasured]
     if blind:
         columns = columns.copy()
         columns[:, blind] = 0.0

@@ -149,13 +149,16 @@ class DesignMatrix:
         left: what a first fit leaves of each run, (samples, joints), for families that look at it.
         """
         offered = tuple(families)
-        blocks = [block for family in offered for block in self._offered_blocks(family, left)]
+        blocks = [block for family in offered for block in self._usable_blocks(self._offered(family, left))]
         return replace(self, blocks=tuple(blocks), families=offered)
 
-    def _offered_blocks(self, family: Family, left: Sequence[Array] | None) -> list[Block]:
+    def _offered(self, family: Family, left: Sequence[Array] | None) -> list[tuple[Candidate, int]]:
+        """Candidates of a family, each with its variant."""
         arm, scenes = self.simulation.arm, self.scenes
         places = family.candidates(arm, scenes) if left is None else family.scan(arm, scenes, left)
-        asked = [(each, at) for shapes in places for at, each in enumerate(shapes) if not each.second_name]
+        return [(each, at) for shapes in places for at, each in enumerate(shapes) if not each.second_name]
+
+    def _usable_blocks(self, asked: Sequence[tuple[Candidate, int]]) -> list[Block]:
         return [block for block in self.blocks_of(asked) if is_usable(block)]
 
     def scanned_again(self, left: Callable[[str], Sequence[Array]]) -> "DesignMatrix":
@@ -165,13 +168,10 @@ class DesignMatrix:
         numbers. A place is corrected for what both looks have compared, because the looks of its blocks add up.
         """
         known = {_scanned_shape(each.candidate) for each in self.blocks}
-        found = [
-            block
-            for family in self.families
-            if type(family).scan is not Family.scan
-            for block in self._offered_blocks(family, left(family.effect))
-            if block.candidate.looks > 1 and _scanned_shape(block.candidate) not in known
-        ]
+        scanning = (family for family in self.families if type(family).scan is not Family.scan)
+        offered = (each for family in scanning for each in self._offered(family, left(family.effect)))
+        asked = [(each, at) for each, at in offered if each.looks > 1 and _scanned_shape(each) not in known]
+        found = self._usable_blocks(asked)
         return replace(self, blocks=(*self.blocks, *found)) if found else self
 
     def with_blocks(self, changed: dict[int, Block]) -> "DesignMatrix":
