@@ -85,11 +85,13 @@ def test_a_name_needs_nine_tenths_a_cause_one_half_and_less_is_not_stated(
     assert found.probability == pytest.approx(expected.probability)
 
 
-def test_a_finding_that_nobody_misses_is_none() -> None:
-    useless = claim("torque_offset", removal=replace(MISSED, growth=0.0))
+def test_a_finding_without_which_the_error_falls_is_none_nor_one_in_doubt_that_held_out_runs_do_not_need() -> None:
+    harmful = claim("torque_offset", removal=replace(MISSED, growth=-0.01))
+    not_needed = replace(MISSED, growth=0.0)
+    sure, doubtful = claim("torque_saturation", removal=not_needed), claim("payload", 1, 0.6, removal=not_needed)
     improbable = claim("backlash", probability=0.2)
-    kept = stated_findings([useless, improbable, claim("payload")], joints=6)
-    assert [each.effect for each in kept] == ["payload"]
+    kept = stated_findings([harmful, sure, doubtful, improbable, claim("payload")], joints=6)
+    assert [each.effect for each in kept] == ["torque_saturation", "payload"]
 
 
 @pytest.mark.parametrize(("joints", "better", "minor"), [((0, 1), (), False), ((0,), (), True), ((0, 1), (2,), True)])
