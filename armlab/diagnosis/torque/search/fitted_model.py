@@ -167,15 +167,13 @@ def search_effects(model: FittedModel, progress: Progress) -> FittedModel:
         noise, known = fit_coloured_noise(model), model.state if number else None
         design, steps = _follow_model(model) if number else model.design, model.steps
         del model  # its columns, before there are others
-        searched = _search_state(design, noise, known, True, steps)
+        model = _search_state(design, noise, known, True, steps)
         progress("fitting nonlinear parameters")
-        design, steps = (
-            design.with_blocks(refine_shapes(design, noise, searched.solver, searched.state)),
-            searched.steps,
-        )
-        known = searched.state
-        del searched
-        model = _fit_model(design, noise, known, steps)
+        better = refine_shapes(design, noise, model.solver, model.state)
+        if better:
+            known, steps = model.state, model.steps
+            del model
+            model = _fit_model(design.with_blocks(better), noise, known, steps)
     progress("searching, last round")
     return _search_state(model.design, fit_coloured_noise(model), model.state, False, model.steps)
 
