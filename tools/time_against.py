@@ -8,6 +8,7 @@ is that of rounds.
 
 import argparse
 import filecmp
+import math
 import shutil
 import subprocess
 import sys
@@ -16,16 +17,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from armlab.common.errors import InputError
 from armlab.common.processes import MeasuredRun, measure_run
 from armlab.common.settings import read_json
 from tools.structure import ROOTS
-from tools.verdicts import first_difference
 
 ROOT = Path(__file__).resolve().parents[1]
 ROUNDS = 3
 VERDICT = "verdict.json"
+RELATIVE, ABSOLUTE = 1e-6, 1e-9  # differences of numbers that sums in another order make
 
 
 @dataclass(frozen=True)
@@ -111,6 +113,31 @@ def describe_ratio(pairs: Sequence[tuple[float, float]]) -> str:
     ratios = [now / before for before, now in pairs]
     least = min(now for _, now in pairs) / min(before for before, _ in pairs)
     return f"{least:.2f} of before ({min(ratios):.2f} to {max(ratios):.2f})"
+
+
+def first_difference(before: Any, now: Any, place: str = "") -> str | None:
+    """Where two documents differ first, and in what; None where they are equal, numbers within a millionth."""
+    if isinstance(before, dict) and isinstance(now, dict):
+        if before.keys() != now.keys():
+            return f"{place or 'the document'} has {', '.join(sorted(before.keys() ^ now.keys()))} on one side only"
+        pairs = [(f"{place}.{key}".removeprefix("."), before[key], now[key]) for key in before]
+    elif isinstance(before, list) and isinstance(now, list):
+        pairs = [(f"{place}[{row}]", *each) for row, each in enumerate(zip(before, now, strict=False))]
+        pairs.append((f"length of {place}", len(before), len(now)))
+    else:
+        return None if _is_equal(before, now) else f"{place}: {before!r} before, {now!r} now"
+    found = (first_difference(one, other, where) for where, one, other in pairs)
+    return next((each for each in found if each is not None), None)
+
+
+def _is_equal(before: Any, now: Any) -> bool:
+    if _is_number(before) and _is_number(now):
+        return math.isclose(before, now, rel_tol=RELATIVE, abs_tol=ABSOLUTE)
+    return type(before) is type(now) and bool(before == now)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _figures(run: MeasuredRun) -> str:

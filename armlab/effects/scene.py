@@ -12,7 +12,7 @@ from problem.motion import Motion
 from problem.pseudo_inertia import least_eigenvalues
 from problem.regressor import inertia_column, rigid_body_torque
 
-MOTION_STEP = 1e-6  # rad (m), rad/s (m/s), for differences: what they are off by is as small
+MOTION_STEP = 1e-4  # rad (m), rad/s (m/s) each way, for differences
 NO_INERTIA = 1e-9  # an eigenvalue of a pseudo-inertia, which rounding leaves of none
 
 
@@ -60,7 +60,7 @@ class Scene:
         return rigid_body_torque(self.arm, self.motion, self.inertial)
 
     def torque_along(self, joint: int, change: Array) -> Array:
-        """By how much the rigid torque of all joints grows, to first order, as one joint (from 0) moves otherwise.
+        """The change of the rigid torque of all joints, to first order, where the motion of one joint (from 0) changes.
 
         change: (3, samples), of its angle, speed and acceleration. Returns (samples, joints), N m (N).
         """
@@ -79,9 +79,9 @@ class Scene:
         return self._by_acceleration[joint]
 
     def torque_slopes(self, joint: int) -> tuple[Array, Array]:
-        """The same with the angle and with the speed of a joint, (samples, joints), N m/rad and N m s/rad (N/m, N s/m).
+        """How the rigid torque of all joints grows with the angle, and with the speed, of one joint (from 0).
 
-        Differences, computed once: hundreds of springs and gaps of a joint ask for them.
+        Central differences, computed once: hundreds of springs and gaps of a joint ask for them.
         """
         if joint not in self._slopes:
             self._slopes[joint] = self._compute_slopes(joint)
@@ -96,16 +96,17 @@ class Scene:
         return {}
 
     def _compute_slopes(self, joint: int) -> tuple[Array, Array]:
-        motion = self.motion
-        position, velocity = motion.position.copy(), motion.velocity.copy()
-        position[:, joint] += MOTION_STEP
-        velocity[:, joint] += MOTION_STEP
-        changed = (
-            Motion(position, motion.velocity, motion.acceleration),
-            Motion(motion.position, velocity, motion.acceleration),
-        )
-        more = (rigid_body_torque(self.arm, each, self.inertial) for each in changed)
-        by_angle, by_speed = ((each - self.links_torque) / MOTION_STEP for each in more)
+        motion, ends = self.motion, []
+        for sign in (1, -1):
+            position, velocity = motion.position.copy(), motion.velocity.copy()
+            position[:, joint] += sign * MOTION_STEP
+            velocity[:, joint] += sign * MOTION_STEP
+            changed = (
+                Motion(position, motion.velocity, motion.acceleration),
+                Motion(motion.position, velocity, motion.acceleration),
+            )
+            ends.append([rigid_body_torque(self.arm, each, self.inertial) for each in changed])
+        by_angle, by_speed = ((more - less) / (2 * MOTION_STEP) for more, less in zip(*ends, strict=True))
         return _read_only(by_angle), _read_only(by_speed)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""How the rigid torque changes with the geometry and gravity, by differences; derivatives of signals.
+"""How the rigid torque changes with the geometry, by central differences, and with gravity; derivatives of signals.
 
 The rigid torque of ten thousand samples costs a millisecond or two, so differences of it are cheaper
 than any formula, and have no errors of their own kind.
@@ -15,7 +15,7 @@ from armlab.effects.contract import Scene
 from problem.arm import Joint
 from problem.regressor import rigid_body_torque
 
-GEOMETRY_STEP = 1e-6  # m, rad
+GEOMETRY_STEP = 1e-4  # m, rad, each way
 WINDOW, ORDER = 9, 4  # samples and degree of the light low-pass (Savitzky and Golay 1964) that differentiates
 
 
@@ -54,10 +54,12 @@ def geometry_derivative(scene: Scene, joint: int, changed: Callable[[Joint, floa
 
     changed: the joint with a change of a size. The links' bodies stay where they are in their frames.
     """
-    joints = list(scene.arm.joints)
-    joints[joint] = changed(joints[joint], GEOMETRY_STEP)
-    torque = rigid_body_torque(replace(scene.arm, joints=tuple(joints)), scene.motion, scene.inertial)
-    return (torque - scene.links_torque) / GEOMETRY_STEP
+    torques = []
+    for step in (GEOMETRY_STEP, -GEOMETRY_STEP):
+        joints = list(scene.arm.joints)
+        joints[joint] = changed(joints[joint], step)
+        torques.append(rigid_body_torque(replace(scene.arm, joints=tuple(joints)), scene.motion, scene.inertial))
+    return (torques[0] - torques[1]) / (2 * GEOMETRY_STEP)
 
 
 def _vector(values: Array) -> tuple[float, float, float]:

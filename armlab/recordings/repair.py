@@ -19,7 +19,6 @@ USUAL_SHARE = 0.9  # of the rows, whose values are usual
 USUAL_STEP_SHARE, MAX_USUAL_STEPS = 0.98, 3.0  # of the steps are usual ones; a longer one than three of them is a jump
 BEYOND_LIMITS = 10.0  # times a limit: no arm is there
 BEYOND_USUAL, BEYOND_LEAST = 1e3, 1e3  # times the usual size, and in SI units at least: no sensor reads so (by eye)
-HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)  # 2**64 over the golden ratio: its multiples lie far apart
 
 
 def required_names(run: MotionRun) -> tuple[str, str]:
@@ -168,17 +167,14 @@ def drop_copied_rows(run: AnyRun) -> AnyRun:
 def duplicated_rows(signals: Sequence[Array]) -> NDArray[np.bool_]:
     """Which rows are equal to an earlier one; a missing number equals another. signals: (rows,) or (rows, columns).
 
-    Rows are compared by a hash first, so that memory holds one number a row.
+    Column by column those rows stay under suspicion whose number comes again: mostly none, after the stamps.
     """
     columns = [column for signal in signals for column in (signal[:, None] if signal.ndim == 1 else signal).T]
-    keys = np.zeros(len(columns[0]), dtype=np.uint64)
+    suspects = np.arange(len(columns[0]))
     for column in columns:
-        keys ^= keys >> np.uint64(29)
-        keys *= HASH_FACTOR
-        keys += _bits(column)
-    same = np.zeros(len(keys), dtype=bool)
-    _, kinds, counts = np.unique(keys, return_inverse=True, return_counts=True)
-    suspects = np.flatnonzero(counts[kinds] > 1)
+        _, kinds, counts = np.unique(column[suspects] + 0.0, return_inverse=True, return_counts=True)
+        suspects = suspects[counts[kinds] > 1]
+    same = np.zeros(len(columns[0]), dtype=bool)
     if len(suspects):
         same[suspects] = True
         rows = np.column_stack([_bits(column[suspects]) for column in columns])

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.time_against import describe_ratio, diagnosis_of, parse_options, take_over_extensions
-from tools.verdicts import first_difference
+from tools.time_against import describe_ratio, diagnosis_of, first_difference, parse_options, take_over_extensions
 
 VERDICT = {
     "status": "mismatch",

@@ -110,16 +110,15 @@ class DesignMatrix:
 
     def blocks_of(self, asked: Sequence[tuple[Candidate, int]]) -> list[Block]:
         """The filtered columns of candidates, each with its variant; side by side they pass the filter faster."""
-        out: list[Block | None] = [None] * len(asked)
-        for calm in (False, True):
-            places = [place for place, (each, _) in enumerate(asked) if _sees_calm_motion(each) is calm]
+        made: dict[int, Block] = {}
+        for scenes in (self.scenes, self.calm):
+            places = [place for place, (each, _) in enumerate(asked) if self.scenes_of(each) is scenes]
             for start in range(0, len(places), FILTERED_AT_ONCE):
-                chunk = places[start : start + FILTERED_AT_ONCE]
-                scenes, same = self.calm if calm else self.scenes, self.settings.guards.same_filter
-                values = filtered_columns([asked[place][0] for place in chunk], scenes, self.observed, same)
-                for place, own in zip(chunk, values, strict=True):
-                    out[place] = Block(*asked[place], own)
-        return [each for each in out if each is not None]
+                some = places[start : start + FILTERED_AT_ONCE]
+                candidates, same = [asked[place][0] for place in some], self.settings.guards.same_filter
+                values = filtered_columns(candidates, scenes, self.observed, same)
+                made |= {place: Block(*asked[place], own) for place, own in zip(some, values, strict=True)}
+        return [made[place] for place in range(len(asked))]
 
     def slope(self, number: int, which: int) -> Array:
         """Derivative of a block's columns by a shape parameter of its candidate, of the shape of these columns."""
@@ -141,7 +140,7 @@ class DesignMatrix:
 
     def scenes_of(self, candidate: Candidate) -> tuple[Scene, ...]:
         """The scenes that a candidate sees."""
-        return self.calm if _sees_calm_motion(candidate) else self.scenes
+        return self.calm if candidate.follows_model and not candidate.follows_closely else self.scenes
 
     def with_candidates(self, families: Iterable[Family], left: Sequence[Array] | None = None) -> "DesignMatrix":
         """With the columns of every candidate that the families offer here, shape by shape.
@@ -186,10 +185,6 @@ class DesignMatrix:
         follow = [number for number, block in enumerate(self.blocks) if block.candidate.follows_model]
         asked = [(block.candidate, block.variant) for block in (self.blocks[number] for number in follow)]
         return moved.with_blocks(dict(zip(follow, moved.blocks_of(asked), strict=True)))
-
-
-def _sees_calm_motion(candidate: Candidate) -> bool:
-    return candidate.follows_model and not candidate.follows_closely
 
 
 def _scanned_shape(candidate: Candidate) -> tuple[object, ...]:

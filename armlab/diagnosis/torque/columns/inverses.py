@@ -31,7 +31,7 @@ def pseudo_inverse_of(matrix: Array) -> Array:
 
 
 def solve_positive(matrix: Array, towards: Array) -> Array:
-    """What a symmetric positive definite matrix makes `towards` of; the shortest of all where it is singular."""
+    """The solution of a symmetric positive definite system of equations; the shortest one where it is singular."""
     if not len(matrix):
         return towards
     _, solved, failed = dposv(matrix, towards, lower=1)

@@ -126,7 +126,7 @@ def finding_shares(parts: Sequence[Part], findings: int) -> tuple[float, ...]:
 def stated_findings(claims: Sequence[Claim], joints: int) -> tuple[Claim, ...]:
     """The findings among claims: what may be stated, and is missed where it is taken away.
 
-    What the held-out runs do not need, as they never move so, is a finding by a sure name alone.
+    What the held-out runs do not need, because they do not move in that way, is a finding only with a sure name.
     An effect of the whole robot that is missed at one joint at most is minor. joints: of the arm.
     """
     stated = (each for each in claims if _is_stated(each))

@@ -15,7 +15,7 @@ import pandas as pd
 from armlab.proof.blind.score.cases import JudgedCase
 from armlab.proof.blind.score.measures import MIN_NAMED_MULTIPLE
 from armlab.proof.blind.score.rows import ScoreRows, to_records
-from armlab.proof.blind.score.words import describe_hidden, describe_loss, describe_said, name_hidden, name_said
+from armlab.proof.blind.score.words import describe_hidden, describe_miss, describe_said, name_hidden, name_said
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def list_misses(cases: Sequence[JudgedCase], table: ScoreRows) -> pd.DataFrame:
     found["law"] = [_hidden_law(case, effect) for case, effect in zip(own, found["effect"], strict=True)]
     rows = zip(own, found["miss"], found["effect"], found["joint"], strict=True)
     found["why"] = [
-        describe_loss(case, effect, joint) if miss == "missed" else "" for case, miss, effect, joint in rows
+        describe_miss(case, effect, joint) if miss == "missed" else "" for case, miss, effect, joint in rows
     ]
     found = found.merge(table.cases[["case", "arm", "noise", *SHOWN_GAP_COLUMNS]], on="case", how="left")
     return found[[*MISS_COLUMNS, *SHOWN_GAP_COLUMNS, *WORD_COLUMNS]]

@@ -85,7 +85,7 @@ def describe_finding(finding: dict[str, Any], what: str) -> str:
     return f"{text}{_category_mark(what)}"
 
 
-def describe_loss(case: JudgedCase, effect: str, joint: Any) -> str:
+def describe_miss(case: JudgedCase, effect: str, joint: Any) -> str:
     """What the diagnosis did with an effect that it does not name: the last step that speaks of it at its joint."""
     place = "" if pd.isna(joint) else f" {int(joint)}"
     about = re.compile(rf"\b{effect}{place}\b")
