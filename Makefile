@@ -7,6 +7,7 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check 
 unexport PYTHONDONTWRITEBYTECODE
 COMPILED := algorithms/flight.c algorithms/flight_build.py \
 	problem/kernel.c problem/kernel_build.py problem/spectra.c problem/spectra_build.py \
+	armlab/common/linear_filter.c armlab/common/linear_filter_build.py \
 	armlab/effects/drive_train.c armlab/effects/drive_train_build.py \
 	armlab/diagnosis/motion/joint_replay.c armlab/diagnosis/motion/joint_replay_build.py \
 	armlab/proof/blind/servo/servo_arm.c armlab/proof/blind/servo/servo_arm_build.py
@@ -154,7 +155,7 @@ hostile: .venv/dev ## damaged input for the commands: tests/hostile_outcomes.csv
 	PYTHONPATH=tests $(BIN)/python tests/hostile_commands.py
 
 clean: ## everything that was made here, the environment included
-	rm -rf .venv .armlab build site jupyter_execute *.egg-info algorithms/_flight.c algorithms/*.so problem/_kernel.c problem/_spectra.c problem/*.so armlab/effects/_drive_train.c armlab/effects/*.so \
-		armlab/diagnosis/motion/_joint_replay.c armlab/diagnosis/motion/*.so \
+	rm -rf .venv .armlab build site jupyter_execute *.egg-info algorithms/_flight.c algorithms/*.so problem/_kernel.c problem/_spectra.c problem/*.so armlab/common/_linear_filter.c armlab/common/*.so \
+		armlab/effects/_drive_train.c armlab/effects/*.so armlab/diagnosis/motion/_joint_replay.c armlab/diagnosis/motion/*.so \
 		armlab/proof/blind/servo/_servo_arm.c armlab/proof/blind/servo/*.so
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -25,6 +25,7 @@ KERNELS = {
     "algorithms._flight": "particle swarms",
     "problem._kernel": "observation matrices",
     "problem._spectra": "condition numbers",
+    "armlab.common._linear_filter": "filters of torque and columns",
     "armlab.effects._drive_train": "play and springs of drive trains",
     "armlab.diagnosis.motion._joint_replay": "replay of position servos",
     "armlab.proof.blind.servo._servo_arm": "simulated servos of the proof",

@@ -7,10 +7,10 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 from scipy.linalg.lapack import dtbtrs
-from scipy.signal import lfilter
 
 from armlab.common.arrays import Array
 from armlab.common.dahl import dahl_state
+from armlab.common.linear_filter import LinearFilter
 from armlab.effects.contract import (
     ANGLE,
     COULOMB_LEVEL,
@@ -306,7 +306,7 @@ class HeatedFriction(Drift):
         between = np.append(power[0], (power[1:] + power[:-1]) / 2)
         before = dict(self.began).get(scene.run, max((seconds for _, seconds in self.began), default=0.0))
         start = 1 - np.exp(-before / self.shape[0])
-        return np.asarray(lfilter([1 - decay], [1, -decay], between, zi=[decay * start])[0])
+        return LinearFilter.first_order_lag(decay).forwards(between, np.array([[decay * start, 0.0]]))
 
     def _warming(self) -> str:
         return f"w, {format_number(self.shape[0])} dw/dt = qd_{self.joint}^2/{format_number(self.power)} - w"

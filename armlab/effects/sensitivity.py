@@ -8,7 +8,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import savgol_filter
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.polynomial.polynomial import polyder, polyval, polyvander
 
 from armlab.common.arrays import Array
 from armlab.effects.contract import Scene
@@ -22,7 +23,11 @@ WINDOW, ORDER = 9, 4  # samples and degree of the light low-pass (Savitzky and G
 def smooth_derivative(signal: Array, step: float, order: int) -> Array:
     """Derivative of a signal (samples,) that a short polynomial through its neighbours has."""
     window = min(WINDOW, len(signal) - 1 + len(signal) % 2)
-    return np.asarray(savgol_filter(signal, window, min(ORDER, window - 1), deriv=order, delta=step, mode="interp"))
+    half = window // 2
+    to_polynomial = np.linalg.pinv(polyvander(np.arange(-half, half + 1), min(ORDER, window - 1)))
+    polynomials = polyder(to_polynomial @ sliding_window_view(signal, window).T, order, scl=1 / step)
+    before, after = np.arange(-half, 0), np.arange(1, half + 1)
+    return np.concatenate([polyval(before, polynomials[:, 0]), polynomials[0], polyval(after, polynomials[:, -1])])
 
 
 def delay_signal(scene: Scene, signal: Array, seconds: float) -> Array:

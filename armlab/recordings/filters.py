@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from armlab.common.arrays import Array
 from armlab.common.errors import DataError
+from armlab.common.linear_filter import LinearFilter
 
 BUTTERWORTH_ORDER = 4  # of the Butterworth filter each way
 
@@ -47,19 +47,15 @@ class Butterworth:
 
     def __call__(self, signal: Array) -> Array:
         """The smoothed signal, rows near the ends left out and thinned: (kept, ...)."""
-        return self.smooth(signal)[self.rows]
+        return self._pass(signal, self.rows)
 
     def smooth(self, signal: Array) -> Array:
         """The smoothed signal, (samples, ...)."""
-        sections, settled = _butterworth_sections(self.cutoff_hz, self.rate_hz)
+        return self._pass(signal, slice(None))
+
+    def _pass(self, signal: Array, rows: slice) -> Array:
         padding = min(int(np.ceil(3 * self.rate_hz / self.cutoff_hz)), len(signal) - 1)
-        columns = signal.reshape(len(signal), -1).T
-        before = 2 * columns[:, :1] - columns[:, padding:0:-1]
-        after = 2 * columns[:, -1:] - columns[:, -2 : -padding - 2 : -1]
-        passed = np.concatenate([before, columns, after], axis=1)
-        for _ in range(2):  # as scipy's sosfiltfilt, which computes the settled state at each call
-            passed = sosfilt(sections, passed, zi=settled[:, None] * passed[:, :1])[0][:, ::-1]
-        return passed[:, padding : passed.shape[1] - padding].T.reshape(signal.shape)
+        return _low_pass(self.cutoff_hz, self.rate_hz).both_ways(signal, padding, rows)
 
     def response(self, frequency_hz: Array) -> Array:
         """Gain at each frequency: the squared one of a single pass, by the bilinear transform."""
@@ -68,7 +64,5 @@ class Butterworth:
 
 
 @lru_cache(maxsize=64)
-def _butterworth_sections(cutoff_hz: float, rate_hz: float) -> tuple[Array, Array]:
-    """Second-order sections and their settled state; cached, because thousands of columns pass one filter."""
-    sections = np.asarray(butter(BUTTERWORTH_ORDER, cutoff_hz, fs=rate_hz, output="sos"))
-    return sections, np.asarray(sosfilt_zi(sections))
+def _low_pass(cutoff_hz: float, rate_hz: float) -> LinearFilter:
+    return LinearFilter.butterworth(BUTTERWORTH_ORDER, cutoff_hz, rate_hz)

@@ -15,9 +15,9 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from armlab.common.arrays import Array
+from armlab.common.linear_filter import LinearFilter
 from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.servo import place
 from armlab.diagnosis.motion.servo_simulation import ServoSimulation
@@ -150,9 +150,12 @@ def even_time(run: MotionRun) -> Array:
     return np.linspace(run.time[0], run.time[-1], run.samples)
 
 
+LOW_PASS_PADDING = 9  # samples by which a signal is continued at its ends: three for each coefficient
+
+
 def low_pass(signals: Array, rate_hz: float, cutoff_hz: float) -> Array:
     """Signals (samples, joints) without what is faster than a cut-off, and without delay."""
-    return np.asarray(sosfiltfilt(butter(2, cutoff_hz, fs=rate_hz, output="sos"), signals, axis=0))
+    return LinearFilter.butterworth(2, cutoff_hz, rate_hz).both_ways(signals, LOW_PASS_PADDING)
 
 
 def motion_of(position: Array, rate_hz: float) -> Motion:

@@ -10,10 +10,10 @@ from functools import cached_property, lru_cache
 from itertools import combinations, islice
 
 import numpy as np
-from scipy.signal import bilinear, lfilter
 
 from armlab.common.arrays import Array
 from armlab.common.dahl import dahl_state
+from armlab.common.linear_filter import LinearFilter
 from armlab.diagnosis.torque.columns.inverses import solve_positive
 from armlab.diagnosis.torque.rows.data import Observed
 from armlab.diagnosis.tuning import SurrogateTuning
@@ -104,8 +104,8 @@ class WholeRuns:
         rate, out = self.observed.signals[0].run.rate_hz, []
         for memory in memories:
             keep = float(np.exp(-1 / (memory * rate)))
-            parts = [lfilter([1 - keep], [1, -keep], part, zi=[keep * part[0]])[0] for part in self.split(values)]
-            out.append(np.concatenate(parts))
+            lag = LinearFilter.first_order_lag(keep)
+            out.append(np.concatenate([lag.forwards(part, lag.settled * part[0]) for part in self.split(values)]))
         return np.column_stack(out)
 
     def turns(self, joint: int, ways: Sequence[float]) -> Array:
@@ -126,17 +126,18 @@ class WholeRuns:
         rate, out = self.observed.signals[0].run.rate_hz, []
         fastest = min(tuning.fastest_swing_hz, tuning.max_swing_share * rate)
         for frequency in np.geomspace(fastest / tuning.swing_range, fastest, tuning.swings):
-            for taps in _spring_taps(float(frequency), tuning.swing_damping, rate):
-                out.append(np.concatenate([lfilter(*taps, part - part[0]) for part in self.split(drive)]))
+            for swing in _swings(float(frequency), tuning.swing_damping, rate):
+                out.append(np.concatenate([swing.forwards(part - part[0]) for part in self.split(drive)]))
         return np.column_stack(out)
 
 
 @lru_cache(maxsize=64)
-def _spring_taps(frequency: float, damping: float, rate: float) -> tuple[tuple[Array, Array], ...]:
-    """Taps of the deflection and of the speed of a driven spring, by the bilinear transform, right at its frequency."""
+def _swings(frequency: float, damping: float, rate: float) -> tuple[LinearFilter, LinearFilter]:
+    """The deflection and the speed of a driven spring, by the bilinear transform, right at its frequency."""
     turn = 2 * rate * np.tan(np.pi * frequency / rate)
-    spring = [1, 2 * damping * turn, turn**2]
-    return tuple(bilinear(driven, spring, rate) for driven in ([turn**2], [turn, 0]))
+    spring = (1.0, 2 * damping * turn, turn**2)
+    deflection, speed = ((0.0, 0.0, turn**2), (0.0, turn, 0.0))
+    return LinearFilter.bilinear(deflection, spring, rate), LinearFilter.bilinear(speed, spring, rate)
 
 
 def whole_runs(observed: Observed) -> WholeRuns:
