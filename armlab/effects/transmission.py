@@ -9,6 +9,7 @@ is integrated in time.
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any, Self
 
 import numpy as np
@@ -175,6 +176,8 @@ GAPS = (1e-4, 6e-4, 4e-3)  # rad, for a first look
 GAP_RANGE = (1e-5, 5e-2)
 SCANNED_GAPS = np.geomspace(2e-5, 2e-2, 32)
 KEPT_GAPS = 2  # gaps of a scan
+LOAD_CHANGE = 1e-6  # of a load, that tells whether a twist is decided by it
+LOAD_ERROR = 0.01  # of a load: were all of a twist's torque another one with it, nothing would tell it
 SIDE_BY_SIDE = 8  # gaps that are integrated at a time, as many as there are lanes in drive_train.c
 
 
@@ -313,13 +316,28 @@ class Backlash(Transmission):
 
     @classmethod
     def from_scan(cls, arm: Arm, joint: int, scenes: Sequence[Scene], residuals: Sequence[Array]) -> list[Self]:
-        """The gaps whose torque at the joint resembles most what is left there; first looks with a recorded one."""
+        """The gaps whose torque at the joint resembles most what is left there; first looks with a recorded one.
+
+        Of the gaps whose twist the recording decides.
+        """
         looks = cls.initial_shapes(arm, joint, scenes)
         if looks[0].measured is not None:
             return looks
         gaps = cls._gaps(arm, joint, SCANNED_GAPS.tolist())
         alike = _resemblance(gaps, scenes, residuals, joint - 1)
-        return [replace(gaps[place], looks=len(gaps)) for place in np.argsort(-alike)[:KEPT_GAPS]]
+        decided = (each for each in (gaps[place] for place in np.argsort(-alike)) if each.is_decided_by(scenes))
+        return [replace(each, looks=len(gaps)) for each in islice(decided, KEPT_GAPS)]
+
+    def is_decided_by(self, scenes: Sequence[Scene]) -> bool:
+        """Whether the recording tells the twist: where it rattles, the least error of the load grows to another one."""
+        change = size = 0.0
+        for scene in scenes:
+            load = load_at(scene, self.index)
+            more = replace(load, torque=(1 + LOAD_CHANGE) * load.torque)
+            torque, other = (integrate_twist(each, self.law[0])[2] * load.inertia for each in (load, more))
+            change += float(np.sum((other - torque) ** 2))
+            size += float(np.sum(torque**2))
+        return change <= (LOAD_CHANGE / LOAD_ERROR) ** 2 * size
 
     @classmethod
     def _gaps(cls, arm: Arm, joint: int, gaps: Sequence[float]) -> list[Self]:

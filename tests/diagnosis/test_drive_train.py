@@ -22,6 +22,7 @@ from armlab.effects.transmission import (
     integrate_twists,
     load_at,
 )
+from problem.motion import Motion
 
 JOINT = 1
 FINER = 8  # instants a sample: an impact is shorter than one
@@ -112,6 +113,17 @@ def test_a_scan_finds_the_gap_that_left_its_torque() -> None:
     found = Backlash.from_scan(arm, JOINT + 1, [where], [left])
     assert found[0].shape[0] == pytest.approx(1.1e-3, rel=0.3)
     assert found[0].looks > 2
+
+
+def test_a_gap_in_which_a_train_rattles_is_not_decided_by_the_recording() -> None:
+    time, smooth = waves(3, 2, 20.0)
+    shaken = Motion(*(each.copy() for each in (smooth.position, smooth.velocity, smooth.acceleration)))
+    for hertz, size in ((7.1, 60.0), (11.3, 45.0)):  # rad/s2, that turn the load over at each swing
+        shaken.acceleration[:, JOINT] += size * np.sin(2 * np.pi * hertz * time)
+    arm = random_arm("RRR", seed=3)
+    gaps = [Backlash.at(arm, JOINT + 1, shape=(gap,)) for gap in (2e-5, 5e-2)]
+    assert all(gap.is_decided_by([scene_of(arm, smooth, time)]) for gap in gaps)
+    assert [gap.is_decided_by([scene_of(arm, shaken, time)]) for gap in gaps] == [True, False]
 
 
 def test_first_looks_at_a_spring_follow_the_load_at_once_or_ring() -> None:
