@@ -15,7 +15,7 @@ from armlab.common.arrays import Array
 from armlab.common.probabilities import student_quantile
 from armlab.recordings.cutoff import travel_bandwidth
 from armlab.recordings.reading.fit import Fitter, ReadingScore
-from armlab.recordings.reading.mistakes import POSITION, TORQUE, improbability, is_of_one_joint
+from armlab.recordings.reading.mistakes import OF_TIME, POSITION, TORQUE, improbability, is_of_one_joint
 from armlab.recordings.reading.reading import LINK_DATA, Mistake, Reading
 from armlab.recordings.reading.signals import thin_channels
 from armlab.recordings.reading.tuning import ReadingTuning
@@ -133,6 +133,7 @@ class ReadingJudge:
     recording: Recording
     looks: list[int] = field(default_factory=lambda: [0])
     _errors: dict[tuple[int, bool], tuple[Reading, Errors, Errors]] = field(default_factory=dict)
+    _lagging: dict[int, tuple[Reading, Trial]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, recording: Recording, tuning: ReadingTuning) -> "ReadingJudge | None":
@@ -175,6 +176,11 @@ class ReadingJudge:
 
         Such friction lags behind the motion, as torque does that is read late.
         """
+        if id(reading) not in self._lagging:
+            self._lagging[id(reading)] = (reading, self._fit_lag(reading))
+        return self._lagging[id(reading)][1]
+
+    def _fit_lag(self, reading: Reading) -> Trial:
         ways = (0.0, *self.tuning.friction_ways)
         tried = [self.trial(replace(reading, friction_ways=(way,) * reading.joints)) for way in ways]
         best = np.argmin([each.free if each.near is None else each.near for each in tried], axis=0)
@@ -242,7 +248,12 @@ class ReadingJudge:
         return self._reaches(before, after, after.reading.mistakes[-1], DOUBT_SHARE * self.tuning.least_evidence)
 
     def _reaches(self, before: Trial, after: Trial, mistake: Mistake, least: float) -> bool:
-        """Whether a reading has so much evidence; where the quick fits do not show most of it, it is not judged."""
+        """Whether a reading has so much evidence; where the quick fits do not show most of it, it is not judged.
+
+        Of torque that is late it is asked beside friction that turns over a way, which may be all there is.
+        """
+        if mistake.effect in OF_TIME:
+            before, after = self.lagging(before.reading), self.lagging(after.reading)
         return self.may_explain(before, after, mistake, least) and self.evidence(before, after, mistake) >= least
 
     def improbability(self, reading: Reading) -> float:

@@ -282,6 +282,7 @@ THREADS_AND_READINGS = {
     "channel_skew": (3, 0, 20, 0),
     SPRING: (1, 0, 1, 0),
 }
+OF_TIME = ("time_delay", "channel_skew")  # torque that is late, as friction is that turns over a way
 # what has a joint to choose and gives it another motion: the best joint alone is the evidence
 OF_ONE_JOINT = ("joint_direction", "axis_coupling", "channel_swap", "channel_order", "encoder_offset", "gear_ratio")
 
@@ -339,7 +340,7 @@ def take_back(reading: Reading, mistake: Mistake, recording: Recording) -> Readi
         return gear_ratio(reading, joint or 0, mistake.value("ratio"))
     if mistake.effect == "base_tilt":
         return base_tilt(reading, np.array(mistake.parameters[0][1]))
-    if mistake.effect in ("time_delay", "channel_skew"):
+    if mistake.effect in OF_TIME:
         return late_torque(reading, joint, mistake.value("seconds"))
     if mistake.effect == "clock_error":
         return clock_error(reading, mistake.value("factor"))

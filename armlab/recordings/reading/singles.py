@@ -147,11 +147,10 @@ def angle_between(first: Array, second: Array) -> float:
 
 
 def _delays(judge: ReadingJudge, start: Trial) -> list[Trial]:
-    """Shifts of torque, of all joints and of one, that fit better than friction that turns over a way."""
+    """Shifts of torque, of all joints and of one."""
     margin, least = judge.fitter.channels.margin_s, judge.tuning.min_delay_s
     if margin <= least:
         return []
-    lagging = judge.lagging(start.reading)
     shifts = np.geomspace(least, margin, judge.tuning.delay_steps)
     out = []
     others = [joint for joint in range(start.reading.joints) if joint + 1 not in judge.usual_joints(start)]
@@ -166,7 +165,7 @@ def _delays(judge: ReadingJudge, start: Trial) -> list[Trial]:
             continue
         reach = abs(best) * (shifts[1] / shifts[0] - 1)
         refined = _refine(make, judge, float(np.clip(best, reach - margin, margin - reach)), float(reach))
-        if abs(refined.reading.mistakes[-1].value("seconds")) >= least and refined.loss < lagging.loss:
+        if abs(refined.reading.mistakes[-1].value("seconds")) >= least:
             out.append(refined)
     return out
 
