@@ -21,7 +21,7 @@ def with_stated_scale(fit: ArmFit, tuning: MotionTuning) -> list[ChosenServo | N
 
     What scales kp, damping, friction and rotor inertia alike changes no motion, but for gravity and the links' inertia.
     Where gravity is weak, and the inertia of the links is a smaller part of the whole than kp is uncertain, neither
-    tells the scale: then kp is as stated, and the others are fitted anew.
+    tells the scale, nor where kp is as uncertain as it is large: then kp is as stated, and the others are fitted anew.
     """
     out: list[ChosenServo | None] = []
     looks, kp = number_of_tests(len(fit.chosen)), place("kp")
@@ -48,7 +48,8 @@ def _is_scale_open(chosen: ChosenServo, learned: Windows) -> bool:
     kp, values, (low, high) = place("kp"), chosen.fit.values, chosen.fit.interval()
     uncertain = float(high[kp] - low[kp]) / (2 * values[kp])
     links = float(np.median(learned.inertia))
-    return has_weak_load(learned, values) and links < uncertain * (links + float(values[place("armature")]))
+    is_open = links < uncertain * (links + float(values[place("armature")]))
+    return uncertain > 1 or (is_open and has_weak_load(learned, values))
 
 
 def without_worse(fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning) -> list[ChosenServo | None]:
