@@ -74,6 +74,9 @@ class Signals:
         return filtered.reshape(-1, matrix.shape[-1])
 
 
+NO_SPEED = 1e-9  # rad/s (m/s): what rounding makes of a joint that stands
+
+
 def differentiate(
     run: Run,
     cutoff_hz: float | None = None,
@@ -95,6 +98,11 @@ def differentiate(
 
 
 def _spline_motion(time: Array, position: Array) -> Motion:
-    """Derivatives of the quintic spline through the positions: fourth order in the step and better."""
+    """Derivatives of the quintic spline through the positions: fourth order in the step and better.
+
+    What stands has no velocity: rounding would give it a direction, and friction with it.
+    """
     spline = make_interp_spline(time, position, k=5)
-    return Motion(position, np.asarray(spline(time, 1)), np.asarray(spline(time, 2)))
+    velocity = np.asarray(spline(time, 1))
+    velocity[np.abs(velocity) < NO_SPEED] = 0.0
+    return Motion(position, velocity, np.asarray(spline(time, 2)))

@@ -32,6 +32,7 @@ from armlab.diagnosis.tuning import Tuning
 from armlab.effects.library import library
 from armlab.recordings.recording import ROLES
 from problem.base_parameters import base_parameters
+from problem.motion import Motion
 
 TUNING = Tuning()
 
@@ -178,6 +179,22 @@ def test_a_surrogate_finds_structure_of_other_joints_and_none_in_noise(observed:
     assert found.gain > 0.5
     assert "position_3" in found.depends_on
     assert structure_of(noise_only[:, 0], 0, made, noise, observed).gain < 0.05
+
+
+def test_features_do_not_tell_what_rounding_makes_of_a_joint_that_stands(observed: Observed) -> None:
+    def with_rounding(seed: int) -> Observed:
+        rng, signals = np.random.default_rng(seed), []
+        for each in observed.signals:
+            position, velocity, acceleration = (part.copy() for part in vars(each.motion).values())
+            position[:, 2] = 0.7 + 1e-15 * rng.normal(size=len(position))
+            velocity[:, 2], acceleration[:, 2] = 0.0, 1e-11 * rng.normal(size=len(position))
+            signals.append(replace(each, motion=Motion(position, velocity, acceleration)))
+        return replace(observed, signals=tuple(signals))
+
+    one, other = (
+        flexible_features(with_rounding(seed), 0, np.random.default_rng(1), TUNING.surrogate).values for seed in (2, 3)
+    )
+    np.testing.assert_allclose(one, other, atol=1e-6)
 
 
 def test_a_small_family_finds_what_drowns_among_all_features(observed: Observed) -> None:

@@ -58,6 +58,15 @@ def test_derivatives_are_those_of_the_motion() -> None:
         assert np.abs(found - wanted).max() < 0.01 * np.abs(wanted).max()
 
 
+def test_a_joint_that_stands_has_no_velocity() -> None:
+    run = run_of()
+    position = run.position.copy()
+    position[:, 1] = 1.234567
+    motion = differentiate(replace(run, position=position), cutoff_hz=8.0).motion
+    assert not motion.velocity[:, 1].any()
+    assert motion.velocity[:, 0].all()
+
+
 def test_encoder_noise_lowers_the_cut_off_and_the_acceleration_stays_right() -> None:
     clean, noisy = (differentiate(run_of(noise=noise)) for noise in (0.0, 1e-4))
     assert clean.cutoff is not None

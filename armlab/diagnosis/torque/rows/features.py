@@ -18,6 +18,7 @@ from armlab.diagnosis.torque.columns.inverses import solve_positive
 from armlab.diagnosis.torque.rows.data import Observed
 from armlab.diagnosis.tuning import SurrogateTuning
 
+ROUNDING = 1e-9  # rad, rad/s, rad/s2, s: sets values of a joint that stands apart
 Part = tuple[Array, tuple[str, ...]]
 
 
@@ -287,6 +288,7 @@ def _standardise(parts: Sequence[Part]) -> Features:
 def _hats(values: Array, hats: int) -> Array:
     """Piecewise linear functions between quantiles of the values, (rows, hats)."""
     knots = np.unique(np.quantile(values, np.linspace(0, 1, hats)))
+    knots = knots[np.append(True, np.diff(knots) > ROUNDING)]  # of a joint that stands many are one
     if len(knots) < 3:
         return np.empty((len(values), 0))
     return np.column_stack([np.interp(values, knots, unit) for unit in np.eye(len(knots))])
@@ -300,7 +302,7 @@ def _products(one: Array, other: Array, hats: int) -> Array:
 
 def _waves(values: Array, rng: np.random.Generator, count: int) -> Array:
     spread = values.std(axis=0)
-    scaled = (values - values.mean(axis=0)) / np.where(spread > 0, spread, 1)
+    scaled = (values - values.mean(axis=0)) / np.where(spread > ROUNDING, spread, 1)
     frequency = rng.normal(0, 1.0, (values.shape[1], count))
     return np.asarray(np.cos(scaled @ frequency + rng.uniform(0, 2 * np.pi, count)))
 
