@@ -7,7 +7,7 @@
 
 #include <stdint.h>
 
-#define MAX_SECTIONS 4 /* as in linear_filter.py */
+#define MAX_SECTIONS 4
 #define MAX_LANES 8
 
 typedef struct {
@@ -79,7 +79,7 @@ both_ways(int sections, const Section *section, const double *settled, int64_t s
 }
 
 /* Columns forwards and backwards, from settled states. signal: samples by columns; out: the kept samples, each
- * step-th from the first, by columns. scratch: (samples + 2 padding) * 8 numbers. */
+ * step-th from the first, by columns. scratch: (samples + 2 padding) * MAX_LANES numbers. */
 void filter_both_ways(int sections, const Section *section, const double *settled, int64_t samples, int64_t columns,
                       int64_t padding, const double *signal, int64_t first, int64_t step, int64_t kept,
                       double *scratch, double *out) {

@@ -13,32 +13,36 @@ import numpy as np
 from armlab.common._linear_filter import ffi, lib
 from armlab.common.arrays import Array
 
-MAX_SECTIONS, LANES = 4, 8  # as in linear_filter.c
-
 
 @dataclass(frozen=True, eq=False)
 class LinearFilter:
-    """Sections in series, each b0, b1, b2, a1, a2 (a0 = 1): y = b0 x + b1 x' + b2 x'' - a1 y' - a2 y''."""
+    """Sections in series, each b0, b1, b2, a1, a2.
+
+    y[t] = b0 x[t] + b1 x[t - 1] + b2 x[t - 2] - a1 y[t - 1] - a2 y[t - 2]
+    """
 
     sections: tuple[tuple[float, float, float, float, float], ...]
 
     def __post_init__(self) -> None:
         """Raises ValueError for more sections than the kernel has."""
-        if len(self.sections) > MAX_SECTIONS:
-            raise ValueError(f"a filter has at most {MAX_SECTIONS} sections, not {len(self.sections)}")
+        if len(self.sections) > lib.MAX_SECTIONS:
+            raise ValueError(f"a filter has at most {lib.MAX_SECTIONS} sections, not {len(self.sections)}")
 
     @classmethod
     def first_order_lag(cls, keep: float) -> "LinearFilter":
-        """y = (1 - keep) x + keep y'."""
+        """y[t] = (1 - keep) x[t] + keep y[t - 1]."""
         return cls(((1 - keep, 0.0, 0.0, -keep, 0.0),))
 
     @classmethod
-    def bilinear(cls, above: Sequence[float], below: Sequence[float], rate_hz: float) -> "LinearFilter":
-        """A transfer function by the bilinear transform; both polynomials (3,) of s, the highest power first."""
+    def bilinear(cls, numerator: Sequence[float], denominator: Sequence[float], rate_hz: float) -> "LinearFilter":
+        """A transfer function by the bilinear transform; both polynomials (3,) of s, the highest power first.
+
+        rate_hz: of the samples.
+        """
         powers = np.array([4 * rate_hz**2, 2 * rate_hz, 1.0])
         by_power = np.array([[1, -2, 1], [1, 0, -1], [1, 2, 1]])
-        b0, b1, b2 = (powers * above) @ by_power
-        a0, a1, a2 = (powers * below) @ by_power
+        b0, b1, b2 = (powers * numerator) @ by_power
+        a0, a1, a2 = (powers * denominator) @ by_power
         return cls(((b0 / a0, b1 / a0, b2 / a0, a1 / a0, a2 / a0),))
 
     @classmethod
@@ -55,7 +59,7 @@ class LinearFilter:
 
     @cached_property
     def settled(self) -> Array:
-        """States (sections, 2) after a constant input of one, for ever."""
+        """States (sections, 2) after an input of one that has lasted for a long time."""
         states, level = [], 1.0
         for b0, b1, b2, a1, a2 in self.sections:
             out = level * (b0 + b1 + b2) / (1 + a1 + a2)
@@ -73,10 +77,10 @@ class LinearFilter:
         return out
 
     def both_ways(self, signal: Array, padding: int, rows: slice = slice(None)) -> Array:
-        """The rows of a signal (samples, ...) that is filtered forwards and backwards (Gustafsson 1996).
+        """A signal (samples, ...) filtered forwards and then backwards, which leaves no delay; the chosen rows of it.
 
-        padding: by how many samples each end is continued, by its mirror image through the end. Raises ValueError for
-        more than the signal has, and for rows that do not ascend.
+        padding: how many samples are added at each end: the signal there, turned about its last point. Raises
+        ValueError for a padding as long as the signal, and for rows in descending order.
         """
         samples = len(signal)
         if not 0 <= padding < samples:
@@ -87,7 +91,7 @@ class LinearFilter:
             raise ValueError("rows should be in ascending order")
         kept = len(range(first, end, step))
         out = np.empty((kept, *signal.shape[1:]))
-        scratch = np.empty((samples + 2 * padding) * LANES)
+        scratch = np.empty((samples + 2 * padding) * lib.MAX_LANES)
         if out.size:
             lib.filter_both_ways(
                 len(self.sections),

@@ -5,6 +5,8 @@ from pathlib import Path
 import cffi
 
 DECLARED = """
+#define MAX_SECTIONS ...
+#define MAX_LANES ...
 typedef struct {
     double b0, b1, b2, a1, a2;
 } Section;
