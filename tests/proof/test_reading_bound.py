@@ -10,12 +10,12 @@ from scipy.stats import t as student
 from armlab.common.errors import InputError
 from armlab.proof.open.likeness.real_arms import RealFolder
 from armlab.proof.open.real_folders.reading_bound import ArmVerdict, WrongReading, bound_of, write_bound
-from armlab.recordings.reading.tuning import learnt_bound
+from armlab.recordings.reading.tuning import learnt
 
 
 def wrong_reading(arm: str, evidence: float, licensed: bool = True) -> WrongReading:
     folder = RealFolder(Path(arm), arm, licensed, f"{arm}-1")
-    return WrongReading(folder, "torque_sign@1", evidence, (1.0, 0.1))
+    return WrongReading(folder, "torque_sign@1", evidence, (1.0, 0.1), (1.0, 2.0))
 
 
 def test_the_bound_is_the_prediction_limit_of_one_more_arm() -> None:
@@ -51,4 +51,4 @@ def test_the_page_names_no_recording_without_a_licence(tmp_path: Path) -> None:
 
 
 def test_the_bound_that_is_shipped_is_above_what_chance_explains() -> None:
-    assert 0.1 < learnt_bound() < 1.0
+    assert 0.1 < learnt("bound") < 1.0

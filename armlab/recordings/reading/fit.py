@@ -272,7 +272,7 @@ class Fitter:
         motion, tuning = self.columns(reading).motion, self.tuning
         fast = np.abs(motion.velocity).max(axis=0) > tuning.fastest_speed
         turning = np.array([joint.kind == "revolute" for joint in reading.arm.joints])
-        hardly = turning & (np.ptp(motion.position, axis=0) < tuning.little_travel)
+        hardly = turning & (np.ptp(motion.position, axis=0) < tuning.travels[0])
         return frozenset(np.flatnonzero(fast | hardly).tolist())
 
     def torque_gains(self, reading: Reading) -> Array:

@@ -15,7 +15,7 @@ from armlab.common.arrays import Array
 from armlab.common.probabilities import student_quantile
 from armlab.recordings.cutoff import travel_bandwidth
 from armlab.recordings.reading.fit import Fitter, ReadingScore
-from armlab.recordings.reading.mistakes import OF_TIME, POSITION, TORQUE, improbability, is_of_one_joint
+from armlab.recordings.reading.mistakes import OF_TIME, TORQUE, improbability, is_of_one_joint, position_factor
 from armlab.recordings.reading.reading import LINK_DATA, Mistake, Reading
 from armlab.recordings.reading.signals import thin_channels
 from armlab.recordings.reading.tuning import ReadingTuning
@@ -241,30 +241,53 @@ class ReadingJudge:
     def is_accepted(self, before: Trial, after: Trial, mistake: Mistake | None = None) -> bool:
         """Whether a reading explains so much more that a mistake may be named, its last one if left out."""
         mistake = mistake or after.reading.mistakes[-1]
-        return self._reaches(before, after, mistake, self.tuning.least_evidence)
+        return self.reaches(before, after, mistake, self.tuning.least_evidence)
 
     def is_doubt(self, before: Trial, after: Trial) -> bool:
         """Whether a reading that may not be named explains half as much."""
-        return self._reaches(before, after, after.reading.mistakes[-1], DOUBT_SHARE * self.tuning.least_evidence)
+        return self.reaches(before, after, after.reading.mistakes[-1], DOUBT_SHARE * self.tuning.least_evidence)
 
-    def _reaches(self, before: Trial, after: Trial, mistake: Mistake, least: float) -> bool:
+    def reaches(self, before: Trial, after: Trial, mistake: Mistake, least: float) -> bool:
         """Whether a reading has so much evidence; where the quick fits do not show most of it, it is not judged.
 
         Of torque that is late it is asked beside friction that turns over a way, which may be all there is.
         """
-        if mistake.effect in OF_TIME:
-            before, after = self.lagging(before.reading), self.lagging(after.reading)
+        before, after = self.compared(before, after, mistake)
         return self.may_explain(before, after, mistake, least) and self.evidence(before, after, mistake) >= least
 
-    def improbability(self, reading: Reading) -> float:
-        """Of the last mistake of a reading, nats a stretch: what it has to explain better than the commonest one."""
-        return improbability(reading.mistakes[-1], reading.joints) / self.independent
+    def compared(self, before: Trial, after: Trial, mistake: Mistake) -> tuple[Trial, Trial]:
+        """The two readings between which a mistake is judged."""
+        if mistake.effect in OF_TIME:
+            return self.lagging(before.reading), self.lagging(after.reading)
+        return before, after
+
+    def improbability(self, reading: Reading, mistake: Mistake | None = None) -> float:
+        """Of a mistake of a reading, its last one if left out, nats a stretch of time.
+
+        What it has to explain better than the commonest one, less what it makes of how far its joints travel.
+        """
+        mistake = mistake or reading.mistakes[-1]
+        return (improbability(mistake, reading.joints) - self._travel_odds(reading, mistake)) / self.independent
+
+    def _travel_odds(self, reading: Reading, mistake: Mistake) -> float:
+        """Log odds of the travel of joints without and with a mistake that scales it, mean of the joints that turn."""
+        factor = position_factor(mistake)
+        if factor == 1.0:
+            return 0.0
+        own = range(reading.joints) if mistake.joint is None else (mistake.joint - 1,)
+        turning = [joint for joint in own if reading.arm.joints[joint].kind == "revolute"]
+        if not turning:
+            return 0.0
+        travel = np.ptp(self.fitter.columns(reading).motion.position[:, turning], axis=0)
+        off = np.log(np.maximum(travel, SMALLEST) / self.tuning.usual_travel) / self.tuning.travel_scatter
+        other = off + np.log(factor) / self.tuning.travel_scatter
+        tail = TRAVEL_DEGREES
+        return float(np.mean(0.5 * (tail + 1) * (np.log1p(other**2 / tail) - np.log1p(off**2 / tail))))
 
     def cost(self, trial: Trial) -> float:
         """The loss of a reading, and what each of its mistakes has to explain to be named, nats."""
-        chance = sum(improbability(each, trial.reading.joints) for each in trial.reading.mistakes)
-        mistakes = len(trial.reading.mistakes)
-        return trial.loss + mistakes * self.tuning.least_evidence + chance / self.independent
+        chance = sum(self.improbability(trial.reading, each) for each in trial.reading.mistakes)
+        return trial.loss + len(trial.reading.mistakes) * self.tuning.least_evidence + chance
 
     def overall_error(self, trial: Trial) -> float:
         """Held-out error near the simulation's links, geometric mean over the joints, of the torque's scatter."""
@@ -283,8 +306,7 @@ class ReadingJudge:
             if is_of_one_joint(mistake)
             else [float(np.sum(each)) for each in falls]
         )
-        chance = improbability(mistake, after.reading.joints) / self.independent
-        return max(gains) >= QUICK_SHARE * (least + chance)
+        return max(gains) >= QUICK_SHARE * (least + self.improbability(after.reading, mistake))
 
     def is_told_by_geometry(self, before: Trial, after: Trial, mistake: Mistake) -> bool:
         """Whether no other links would explain what was recorded as well."""
@@ -303,7 +325,7 @@ class ReadingJudge:
         if before.near is None:
             return free
         if mistake.effect == LINK_DATA:
-            free = -improbability(mistake, after.reading.joints) / self.independent
+            free = -self.improbability(after.reading, mistake)
         floor = self.tuning.smallest_error
         (first, _), (near, best) = self.errors(before.reading, may_carry), self.errors(after.reading)
         gap, left = (
@@ -317,17 +339,14 @@ class ReadingJudge:
     def _evidence(self, view: View, reading: Reading, mistake: Mistake) -> float:
         """What surely falls, less what the best of so many wrong readings explains by chance."""
         least = view.least_gain(self.sure, is_of_one_joint(mistake))
-        return least - improbability(mistake, reading.joints) / self.independent
+        return least - self.improbability(reading, mistake)
 
     def is_size_plausible(self, parent: Reading, reading: Reading) -> bool:
-        """Whether a last mistake that scales makes sizes more alike, as a wrong unit does.
+        """Whether a last mistake that scales torques or links makes these more alike, as a wrong unit does.
 
-        Of torques and links: else the links may vanish, or grow, until friction alone explains the torque. Of the
-        positions of one joint: else a joint that hardly moves explains what no reading does.
+        Else the links may vanish, or grow, until friction alone explains the torque.
         """
         mistake = reading.mistakes[-1]
-        if mistake.effect == "unit_error" and mistake.form == POSITION:
-            return mistake.joint is None or self._is_travel_more_alike(parent, reading, mistake.joint - 1)
         links = mistake.effect == LINK_DATA and mistake.form != "centre_sign"
         scales = links or (mistake.effect == "unit_error" and mistake.form == TORQUE)
         if not scales:
@@ -340,19 +359,6 @@ class ReadingJudge:
         own, others = sizes[mistake.joint - 1], float(np.median(np.delete(sizes, mistake.joint - 1)))
         return bool(abs(own - np.log(mistake.value("factor")) - others) < abs(own - others))
 
-    def _is_travel_more_alike(self, parent: Reading, reading: Reading, joint: int) -> bool:
-        """Whether a joint (from 0) travels more as far as the other joints of its kind do, where there are any."""
-        kinds = [each.kind for each in reading.arm.joints]
-        others = [place for place, kind in enumerate(kinds) if kind == kinds[joint] and place != joint]
-        if not others:
-            return True
-        before, after = (
-            np.log(np.maximum(np.ptp(self.fitter.columns(each).motion.position, axis=0), SMALLEST))
-            for each in (parent, reading)
-        )
-        usual = float(np.median(before[others]))
-        return bool(abs(after[joint] - usual) < abs(before[joint] - usual))
-
     def _size_mismatch(self, reading: Reading) -> float:
         """Sum over joints of the logarithms between the scatter of the torque and that of the links as given."""
         columns = self.fitter.columns(reading)
@@ -364,6 +370,7 @@ class ReadingJudge:
 
 
 SMALLEST = 1e-300
+TRAVEL_DEGREES = 4  # of freedom of Student's t: some joints hardly move
 CONFIDENCE = 0.95  # of what a reading surely explains, two-sided
 DOUBT_SHARE = 0.5  # of the evidence for a name: what cannot be excluded
 QUICK_SHARE = 0.75  # of a fall with links that bodies can have, which links without that bound show

@@ -298,6 +298,14 @@ def improbability(mistake: Mistake, joints: int) -> float:
     return float(np.log(readings * commonest / threads))
 
 
+def position_factor(mistake: Mistake) -> float:
+    """Recorded over true position of the joints of a mistake, its size: 1 where it scales none."""
+    if mistake.effect == "gear_ratio":
+        return abs(mistake.value("ratio"))
+    scales = mistake.effect == "unit_error" and mistake.form == POSITION
+    return mistake.value("factor") if scales else 1.0
+
+
 def is_of_one_joint(mistake: Mistake) -> bool:
     """Whether a mistake is told by one joint, which is chosen among all, and not by all joints together."""
     single = mistake.joint is not None and mistake.effect in ("torque_sign", "unit_error")

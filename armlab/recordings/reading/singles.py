@@ -189,12 +189,12 @@ def _clocks(judge: ReadingJudge, start: Trial) -> list[Trial]:
 
 
 def _gears(judge: ReadingJudge, start: Trial) -> list[Trial]:
-    """Ratios of gears, of joints that travel further than an arm can or hardly at all."""
+    """Ratios of gears, of joints that travel much further than joints of arms do, or much less."""
     out = []
     motion = judge.fitter.columns(start.reading).motion
     travel = np.ptp(motion.position, axis=0)
     for joint, own in enumerate(start.reading.arm.joints):
-        far, little = judge.tuning.far_travel, judge.tuning.little_travel
+        little, far = judge.tuning.travels
         if own.kind != "revolute" or little <= travel[joint] <= far:
             continue
         outwards = travel[joint] > far

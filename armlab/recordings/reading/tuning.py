@@ -1,6 +1,7 @@
 """The tuning numbers of the reading of a recording, with the bound that `armlab proof calibrate-reading` learns."""
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -8,13 +9,13 @@ from typing import Final
 from armlab.common.tuning import tuned
 
 BOUND_FILE: Final = "bound.json"
-BOUND_SCHEMA: Final = "reading-bound/1"
+BOUND_SCHEMA: Final = "reading-bound/2"
 
 
-def learnt_bound() -> float:
-    """What a mistake has to explain beyond chance, nats."""
+def learnt(name: str) -> float:
+    """A number that `armlab proof calibrate-reading` has learnt on real arms, as `BOUND_FILE` calls it."""
     content = json.loads((Path(__file__).parent / BOUND_FILE).read_text(encoding="utf-8"))
-    return float(content["bound"])
+    return float(content[name])
 
 
 @dataclass(frozen=True)
@@ -84,9 +85,19 @@ class ReadingTuning:
     delay_steps: int = tuned(5, unit="values", meaning="delays that are tried each way", least=2)
     max_clock_factor: float = tuned(2.5, meaning="clocks that are tried run so many times too fast or slow", least=1.01)
     clock_steps: int = tuned(13, unit="values", meaning="clocks that are tried", least=3)
-    far_travel: float = tuned(15.0, unit="rad", meaning="a joint that travels further may be read before its gear")
-    little_travel: float = tuned(
-        0.1, unit="rad", meaning="a joint that travels less may be read behind its gear, and no reading makes it so"
+    usual_travel: float = tuned(
+        learnt("usual_travel"),
+        unit="rad",
+        meaning="how far a joint that turns travels in a recording, geometric mean of arms",
+        source="real arms: armlab proof calibrate-reading",
+        least=1e-3,
+    )
+    travel_scatter: float = tuned(
+        learnt("travel_scatter"),
+        unit="of the logarithm",
+        meaning="standard deviation of that of one more joint",
+        source="real arms: armlab proof calibrate-reading",
+        least=1e-3,
     )
     usual_error: float = tuned(
         0.05,
@@ -99,7 +110,7 @@ class ReadingTuning:
         meaning="of all joints, from which on two mistakes are looked for of which none explains much alone",
     )
     least_evidence: float = tuned(
-        learnt_bound(),
+        learnt("bound"),
         unit="nats",
         meaning="what a mistake that is named has to explain beyond chance",
         source="the best wrong readings of real arms: armlab proof calibrate-reading",
@@ -137,3 +148,9 @@ class ReadingTuning:
     least_standstill_share: float = tuned(
         0.2, meaning="a joint that holds less of its gravity torque at standstill is read wrongly"
     )
+
+    @property
+    def travels(self) -> tuple[float, float]:
+        """Between which joints that turn travel, rad: three standard deviations of the logarithm."""
+        factor = math.exp(3 * self.travel_scatter)
+        return self.usual_travel / factor, self.usual_travel * factor

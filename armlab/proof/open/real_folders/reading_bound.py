@@ -9,6 +9,9 @@ one more recording of another arm (Hahn and Meeker 1991, section 4.8),
 Arms count alike in mean and sd, whatever the number of their recordings. The other class are mistakes: each reading
 that was tried is taken for the right one in turn, and what the recording as it is explains beyond it is the evidence
 for this mistake.
+
+How far joints that turn travel in these recordings is learnt beside it: mean and standard deviation of a joint of one
+more arm.
 """
 
 import json
@@ -48,13 +51,15 @@ PAGE_FILE = "reading_bound.md"
 class WrongReading:
     """The best wrong reading of a recording. folder: where it is; name: of the mistake that it would be.
 
-    evidence: nats. mistakes: evidence for mistakes that can be seen, were they there.
+    evidence: nats. mistakes: evidence for mistakes that can be seen, were they there. travels: of the joints that
+    turn, rad.
     """
 
     folder: RealFolder
     name: str
     evidence: float
     mistakes: tuple[float, ...]
+    travels: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -101,15 +106,25 @@ def _recording(folder: RealFolder) -> Recording | None:
 def _best_wrong_reading(folder: RealFolder, recording: Recording, judge: ReadingJudge) -> WrongReading:
     start = judge.trial(read_as_is(recording, read_simulation(recording, None).inertial))
     tried = [each for each in search_singles(judge, start) if each.reading.mistakes[-1].effect != SPRING]
-    falling = [each for each in tried[:JUDGED] if judge.may_explain(start, each, each.reading.mistakes[-1], 0.0)]
-    judged = [(judge.evidence(start, each, each.reading.mistakes[-1]), each) for each in falling or tried[:1]]
+    falling = [each for each in tried[:JUDGED] if _falls(judge, start, each)]
+    judged = [(_evidence(judge, start, each, each), each) for each in falling or tried[:1]]
     evidence, best = max(judged, key=lambda pair: pair[0])
     evidence = max(evidence, -judge.improbability(best.reading))  # the recording as it is explains as much
     spread = tried[:: max(len(tried) // MISTAKES, 1)]
-    mistakes = [
-        judge.evidence(each, start, each.reading.mistakes[-1]) for each in spread if _is_seen(judge, each, start)
-    ]
-    return WrongReading(folder, best.reading.mistakes[-1].label, evidence, tuple(mistakes))
+    mistakes = tuple(_evidence(judge, each, start, each) for each in spread if _is_seen(judge, each, start))
+    travel = np.ptp(judge.judging.columns(start.reading).motion.position, axis=0)
+    turning = [joint.kind == "revolute" for joint in recording.arm.joints]
+    return WrongReading(folder, best.reading.mistakes[-1].label, evidence, mistakes, tuple(travel[turning].tolist()))
+
+
+def _falls(judge: ReadingJudge, before: Trial, after: Trial) -> bool:
+    mistake = after.reading.mistakes[-1]
+    return judge.may_explain(*judge.compared(before, after, mistake), mistake, 0.0)
+
+
+def _evidence(judge: ReadingJudge, before: Trial, after: Trial, wrong: Trial) -> float:
+    mistake = wrong.reading.mistakes[-1]
+    return judge.evidence(*judge.compared(before, after, mistake), mistake)
 
 
 def _is_seen(judge: ReadingJudge, wrong: Trial, right: Trial) -> bool:
@@ -124,35 +139,53 @@ def bound_of(readings: Sequence[WrongReading]) -> float:
 
     Raises InputError for less than three arms.
     """
-    arms = [each.folder.arm for each in readings]
-    count = len(set(arms))
+    mean, deviation, arms = _of_one_more([(each.folder.arm, (each.evidence,)) for each in readings])
+    return round(mean + float(student.ppf(1 - CHANCE, arms - 1)) * deviation, DIGITS)
+
+
+def travel_of(readings: Sequence[WrongReading]) -> tuple[float, float]:
+    """Geometric mean of the travel of joints that turn, rad, and the scatter of its logarithm for one more arm."""
+    logs = [(each.folder.arm, np.log(each.travels).tolist()) for each in readings if each.travels]
+    mean, deviation, _ = _of_one_more(logs)
+    return round(float(np.exp(mean)), DIGITS), round(deviation, DIGITS)
+
+
+def _of_one_more(values: Sequence[tuple[str, Sequence[float]]]) -> tuple[float, float, int]:
+    """Mean and standard deviation of a value of one more arm, from those of some, and how many arms they are of."""
+    arms = np.concatenate([[arm] * len(own) for arm, own in values])
+    names, counts = np.unique(arms, return_counts=True)
+    count = len(names)
     if count < 3:
         raise InputError(f"recordings of {count} arms: a bound needs those of three arms or more")
-    best = np.array([each.evidence for each in readings])
-    weight = np.array([1 / (count * arms.count(arm)) for arm in arms])
-    mean = float(weight @ best)
-    deviation = float(np.sqrt(weight @ (best - mean) ** 2 * (count + 1) / (count - 1)))  # of one more, with the mean's
-    return round(mean + float(student.ppf(1 - CHANCE, count - 1)) * deviation, DIGITS)
+    every = np.concatenate([own for _, own in values])
+    weight = 1 / (count * counts[np.searchsorted(names, arms)])
+    mean = float(weight @ every)
+    # of one more arm, with the error of the mean
+    return mean, float(np.sqrt(weight @ (every - mean) ** 2 * (count + 1) / (count - 1))), count
 
 
 def leave_each_arm_out(
     readings: Sequence[WrongReading], tuning: ReadingTuning, jobs: int, progress: Callable[[str], None]
 ) -> Iterator[ArmVerdict]:
     """The verdict of each arm with the bound of all, and with that of the other arms, also on parts of recordings."""
-    bound = bound_of(readings)
     for arm in sorted({each.folder.arm for each in readings}):
         progress(f"reading {arm} without itself")
         own = [each for each in readings if each.folder.arm == arm]
         folders = list({each.folder.name: each.folder for each in own}.values())
-        without = bound_of([each for each in readings if each.folder.arm != arm])
-        known, fewer = (replace(tuning, least_evidence=each) for each in (bound, without))
+        others = [each for each in readings if each.folder.arm != arm]
+        known, fewer = _learnt(tuning, readings), _learnt(tuning, others)
         named = [name for folder in folders for name in _named(load_recording(folder.path), folder.name, known)]
         jobs_of = (delayed(_named_in_parts)(folder, fewer) for folder in folders)
         read = dict(part for parts in Parallel(n_jobs=jobs)(jobs_of) for part in parts.items())
         whole = [name for (_, part), names in read.items() if part == WHOLE for name in names]
         wrong = tuple(f"{', '.join(names)} ({part})" for (_, part), names in read.items() if names)
         licensed, nearest = all(each.folder.licensed for each in own), max(own, key=lambda each: each.evidence)
-        yield ArmVerdict(arm, licensed, nearest, without, tuple(named), tuple(whole), len(read), wrong)
+        yield ArmVerdict(arm, licensed, nearest, fewer.least_evidence, tuple(named), tuple(whole), len(read), wrong)
+
+
+def _learnt(tuning: ReadingTuning, readings: Sequence[WrongReading]) -> ReadingTuning:
+    usual, scatter = travel_of(readings)
+    return replace(tuning, least_evidence=bound_of(readings), usual_travel=usual, travel_scatter=scatter)
 
 
 def _named(recording: Recording, name: str, tuning: ReadingTuning) -> tuple[str, ...]:
@@ -195,6 +228,7 @@ def bound_lines(verdicts: Sequence[ArmVerdict], bound: float) -> list[str]:
 def write_bound(readings: Sequence[WrongReading], verdicts: Sequence[ArmVerdict], out: Path) -> tuple[Path, ...]:
     """Writes the bound, which the reading uses, and a page about it: of arms whose recordings have a licence."""
     bound, (told, count) = bound_of(readings), share_told(readings, bound_of(readings))
+    travel, scatter = travel_of(readings)
     content = {
         "schema": BOUND_SCHEMA,
         "recordings": len(readings),
@@ -203,6 +237,8 @@ def write_bound(readings: Sequence[WrongReading], verdicts: Sequence[ArmVerdict]
         "mistakes_told": told,
         "mistakes_seen": count,
         "bound": bound,
+        "usual_travel": travel,
+        "travel_scatter": scatter,
     }
     hidden = sum(not each.licensed for each in verdicts)
     parts, false = count_parts(verdicts)
@@ -210,7 +246,8 @@ def write_bound(readings: Sequence[WrongReading], verdicts: Sequence[ArmVerdict]
         "What a reading mistake has to explain",
         f"From {len(readings)} recordings and halves of {len(verdicts)} real arms, read rightly: the best wrong "
         f"reading of one more arm explains more than {bound:.2f} nats with a probability of {CHANCE:.0%}. Of {count} "
-        f"mistakes that can be seen, were they there, {told} explain as much.",
+        f"mistakes that can be seen, were they there, {told} explain as much. Joints that turn travel {travel:.2g} "
+        f"rad, by a factor of {np.exp(scatter):.2g} more or less.",
         f"Each arm with the bound that the others make: {false} of {parts} parts of recordings are said to "
         "hold mistakes (wholes, ends, halves, stretches, fewer rows), none of which is known to be read wrongly.",
         f"All arms but {hidden} whose recordings have no licence:",
