@@ -1,9 +1,9 @@
 """Processor time and memory of this tree beside those of an earlier commit: `python -m tools.time_against COMMIT`.
 
 What is timed is `armlab run configs/table3.yaml` in one process, or with `--diagnose RECORDING...` `armlab diagnose` of
-each recording, whose two verdicts are compared, too. Both trees take turns, with the libraries of this environment.
-The ratio is that of the least times, the start of Python included, as other work on the machine only adds; its range
-is that of rounds.
+each recording, whose two verdicts are compared, too, or with `--read RECORDING...` alone how it is to be read, and the
+sum. Both trees take turns, with the libraries of this environment. The ratio is that of the least times, the start of
+Python included (not that of `--read`), as other work on the machine only adds; its range is that of rounds.
 """
 
 import argparse
@@ -46,21 +46,28 @@ def main(words: Sequence[str]) -> None:
     with TemporaryDirectory() as folder, _tree_of(options.commit, Path(folder)) as earlier:
         for tree in (earlier, ROOT):  # so that no round compiles
             _run(tree, sys.executable, "-m", "compileall", "-q", *(each for each in ROOTS if (tree / each).is_dir()))
+        if options.read:
+            commands = []
+            for line in compare_reading(options.read, earlier, options.rounds):
+                print(line, flush=True)
         for command in commands:
             for line in compare(command, earlier, Path(folder), options.rounds):
                 print(line, flush=True)
 
 
 def parse_options(words: Sequence[str]) -> argparse.Namespace:
-    """`commit`, `diagnose` (folders), `as_read` and `rounds`."""
+    """`commit`, `diagnose` and `read` (folders), `as_read` and `rounds`."""
     parser = argparse.ArgumentParser(prog="python -m tools.time_against", description=(__doc__ or "").split("\n\n")[1])
     parser.add_argument("commit", help="what this tree is compared with")
     parser.add_argument("--diagnose", metavar="RECORDING", nargs="+", type=Path, default=[])
+    parser.add_argument("--read", metavar="RECORDING", nargs="+", type=Path, default=[])
     parser.add_argument("--as-read", action="store_true", help="of the diagnosis")
     parser.add_argument("--rounds", type=int, default=ROUNDS)
     options = parser.parse_args(words)
     if options.as_read and not options.diagnose:
         parser.error("--as-read: only with --diagnose")
+    if options.read and options.diagnose:
+        parser.error("--read: not beside --diagnose")
     if options.rounds < 1:
         parser.error("--rounds: at least 1")
     return options
@@ -89,6 +96,40 @@ def diagnosis_of(recording: Path, as_read: bool) -> TimedCommand:
         return ["diagnose", str(recording.resolve()), "--out", str(out), *["--as-read"] * as_read]
 
     return TimedCommand(recording.resolve().name, words, VERDICT)
+
+
+# both trees have these names
+READ_CODE = """
+import sys, time
+from armlab.recordings.load import load_recording
+from armlab.recordings.reading.answer import read_rightly
+from armlab.recordings.reading.tuning import ReadingTuning
+recording = load_recording(sys.argv[1])
+links = None if recording.arm.links is None else recording.arm.parameters
+start = time.process_time()
+read_rightly(recording, links, ReadingTuning())
+print(time.process_time() - start)
+"""
+
+
+def compare_reading(recordings: Sequence[Path], earlier: Path, rounds: int) -> Iterator[str]:
+    """Lines about how long it takes in both trees to find how each recording is to be read, and about the sum."""
+    least = []
+    for recording in recordings:
+        times = [tuple(_seconds_to_read(recording, tree) for tree in (earlier, ROOT)) for _ in range(rounds)]
+        before, now = (min(each) for each in zip(*times, strict=True))
+        least.append((before, now))
+        yield f"{recording.resolve().name}: reading before {before:.2f} s, now {now:.2f} s, {describe_ratio(times)}"
+    sums = tuple(sum(each) for each in zip(*least, strict=True))
+    yield f"{len(least)} recordings: reading before {sums[0]:.2f} s, now {sums[1]:.2f} s, {describe_ratio([sums])}"
+
+
+def _seconds_to_read(recording: Path, tree: Path) -> float:
+    command = [sys.executable, "-c", READ_CODE, str(recording.resolve())]
+    outcome = subprocess.run(command, cwd=tree, capture_output=True, text=True, check=False)
+    if outcome.returncode != 0:
+        raise InputError(f"{recording}: {outcome.stderr.strip().splitlines()[-1]}")
+    return float(outcome.stdout)
 
 
 def compare(command: TimedCommand, earlier: Path, folder: Path, rounds: int) -> Iterator[str]:

@@ -83,3 +83,9 @@ def test_only_an_extension_of_the_same_source_is_taken_over(tmp_path, source, bu
     earlier = make_tree(tmp_path / "earlier", "int a;", built=False)
     assert take_over_extensions(make_tree(tmp_path / "now", source, built), earlier) is taken
     assert (earlier / "problem/_kernel.abi3.so").exists() is taken
+
+
+def test_readings_are_timed_alone():
+    assert parse_options(["abc", "--read", "one", "two"]).read == [Path("one"), Path("two")]
+    with pytest.raises(SystemExit):
+        parse_options(["abc", "--read", "one", "--diagnose", "two"])

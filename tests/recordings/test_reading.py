@@ -26,6 +26,7 @@ from armlab.recordings.reading.mistakes import (
     clock_error,
     contradicted_by,
     encoder_offset,
+    improbability,
     late_torque,
     signs,
     take_back,
@@ -375,22 +376,22 @@ def test_what_frees_the_joints_of_their_links_is_no_unit(tmp_path: Path) -> None
     assert not any(judge.is_accepted(start, each) for each in search_singles(judge, start))
 
 
-def test_a_joint_that_travels_as_far_as_the_others_is_in_their_unit(tmp_path: Path) -> None:
+def test_travel_speaks_for_the_unit_that_makes_it_usual(tmp_path: Path) -> None:
     """An unknown load makes a joint that hardly moves explain more; only a joint that travels too far is in degrees."""
     for factor, wanted in ((1.0, set[str]()), (180 / np.pi, {"unit_error@1"})):
         recording = recording_with(tmp_path / f"{factor:.0f}", scale(["q1"], factor))
         judge = ReadingJudge.of(recording, TUNING)
         assert judge is not None
-        start = read_as_is(recording, ARM.parameters)
         degrees = [
             each
-            for each in units(start)
+            for each in units(read_as_is(recording, ARM.parameters))
             if each.mistakes[-1].form == "position"
             and each.mistakes[-1].value("factor") > 1
             and each.mistakes[-1].joint
         ]
         assert len(degrees) == 3
-        assert {each.mistakes[-1].label for each in degrees if judge.is_size_plausible(start, each)} == wanted
+        commonest = improbability(degrees[0].mistakes[-1], 3) / judge.independent
+        assert {each.mistakes[-1].label for each in degrees if judge.improbability(each) < commonest} == wanted
 
 
 @pytest.mark.parametrize("seconds", [1.0, 2.5])
