@@ -91,8 +91,8 @@ def reason_impossible(pooled: Pooled, table: ChangeTable, found: Sequence[Tested
     _, covariance = between_ends(table, tested)
     if group.candidate.facts.scales_torque:
         return _reason_no_scale(pooled, table, tested)
-    if group.parts:
-        return _reason_driving(pooled, table, found, tested, covariance)
+    if group.parts or group.laws:
+        return _reason_driving(pooled, table, tested, covariance)
     for law, own, of_group in laws_of(pooled, table, found, tested):
         if not law.known:
             continue
@@ -113,19 +113,23 @@ def _reason_no_scale(pooled: Pooled, table: ChangeTable, tested: Tested) -> str 
     return "torque would change its sign" if np.any(np.abs(difference) >= 2 * mean) else None
 
 
-def _reason_driving(
-    pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested, covariance: Array
-) -> str | None:
-    """What speaks against all friction of a joint: that together it would drive the motion in one of the recordings.
+def _reason_driving(pooled: Pooled, table: ChangeTable, tested: Tested, covariance: Array) -> str | None:
+    """What speaks against a change of all friction of a joint: that it would drive the motion in a recording.
 
     A single coefficient may be negative: that of viscous friction is where friction saturates.
     """
-    block = table.groups[tested.group].block
+    model, block = pooled.model, table.groups[tested.group].block
     row = block.candidate.rows[0]
-    power = np.mean(block.values[:, 0] * pooled.observed.kept("velocity")[:, row, None], axis=0)
-    levels = np.concatenate([own for _, own, _ in laws_of(pooled, table, found, tested)], axis=1)
+    velocity = pooled.observed.kept("velocity")[:, row]
+    common = 0.0
+    for number, own in enumerate(model.design.blocks):
+        if own.candidate.is_friction_of(row + 1):
+            nominal = pooled.design.simulation.coefficients_of(own.candidate)
+            torque = own.values[:, 0] @ (model.solver.values(model.fit, number) + nominal)
+            common += float(np.mean(velocity * torque))
+    power = np.mean(block.values[:, 0] * velocity[:, None], axis=0)
     doubt = SIGN_SIGMAS * float(np.sqrt(power @ covariance @ power))
-    if np.all(levels @ power + doubt > 0):
+    if np.all(common + recording_values(table, tested) @ power + doubt > 0):
         return None
     return f"the friction of joint {row + 1} would drive it"
 

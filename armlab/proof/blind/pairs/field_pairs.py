@@ -20,7 +20,8 @@ from armlab.proof.blind.field.files import write_field_observation
 from armlab.proof.blind.pairs.pair_cases import SIDES, known_differences, write_answer
 
 WARMED = 0.05  # of the friction: less drowns in the rest of any joint
-LAWS = ("coulomb_friction", "viscous_friction")
+# names of friction whose level and slope grow: its state has a memory at every joint
+LAWS = ("coulomb_friction", "viscous_friction", "presliding_hysteresis")
 
 
 def write_field_pair(plan: FieldPlan, observation: Path, truth: Path) -> None:
@@ -81,4 +82,5 @@ def _changed(change: FieldEffect) -> list[dict[str, Any]]:
         known = {"gain": change.size}
     elif change.law is not None and "payload" not in change.effects:
         known = known_differences(change.law)
-    return [{"effect": effect, "joint": change.place, "differences": known} for effect in change.effects]
+    effects = LAWS if change.number == "friction" else change.effects
+    return [{"effect": effect, "joint": change.place, "differences": known} for effect in effects]

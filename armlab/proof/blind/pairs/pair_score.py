@@ -7,7 +7,7 @@ that changed is named and known.
 
 Plain least squares, which shares nothing with the comparison, is fitted to both recordings of each pair: where it sees
 a change beyond `SEEN_ERRORS` standard errors, the comparison may not say "same". Where nothing changed, it may see none
-there itself: else it would be no yardstick.
+there itself: else it would be no yardstick. Between other motions it is none, as what a model lacks differs there.
 """
 
 import json
@@ -29,6 +29,7 @@ from armlab.recordings.plain_least_squares import SEEN_ERRORS, compare_plain_fol
 MAX_CLASS = 3  # names
 FALSE, RIGHT, WRONG = "nothing changed, something named", "right name or class of three", "wrong names among all names"
 COVERED = "intervals that hold the truth"
+SEEN = f"{RIGHT}, where plain least squares sees more than {SEEN_ERRORS:g} standard errors"
 MISSED = f'"same" where plain least squares sees more than {SEEN_ERRORS:g} standard errors'
 BROKEN_YARDSTICK = f"nothing changed, plain least squares sees more than {SEEN_ERRORS:g} standard errors"
 WANTED = {FALSE: "at most 2%", RIGHT: "at least 95%", COVERED: "90% to 98%", MISSED: "none", BROKEN_YARDSTICK: "none"}
@@ -149,6 +150,8 @@ def measures_of(outcomes: Sequence[PairOutcome]) -> Iterator[Share]:
     }
     for name, own in parts.items():
         yield from _measure(own, name)
+    for name in (", same motion", ", another motion"):
+        yield from _measure_plainly(parts[name], name)
     for kind in CHANGE_KINDS:
         seen = [each for each in outcomes if each.kind == kind and each.visible]
         if seen:
@@ -174,6 +177,7 @@ def _measure_plainly(outcomes: Sequence[PairOutcome], name: str) -> Iterator[Sha
     nulls = [each for each in outcomes if each.kind == "null" and each.plain is not None]
     seen = [each for each in outcomes if each.kind != "null" and each.is_seen_plainly]
     if seen:
+        yield Share(f"{SEEN}{name}", sum(each.right for each in seen), len(seen))
         yield Share(f"{MISSED}{name}", sum(each.status == "same" for each in seen), len(seen))
     if nulls:
         yield Share(f"{BROKEN_YARDSTICK}{name}", sum(each.is_seen_plainly for each in nulls), len(nulls))
