@@ -35,6 +35,13 @@ MAX_LENGTH_IN_MM = 0.1  # m
 VALUE_DIGITS = 3  # of a value with its interval
 
 
+def how_it_falls(arm: Arm, joint: int, falls: bool) -> str:
+    """`falls most at joint 2`, or `falls` where there is no other joint: an error with what was found."""
+    if len(arm) == 1:
+        return "falls" if falls else "does not fall"
+    return f"{'falls most' if falls else 'does not fall'} at {joint_in_words(arm, joint)}"
+
+
 def effect_in_words(effect: str) -> str:
     """The name of an effect in a sentence; ValueError for an id that no effect has."""
     return effect_named(effect).words

@@ -11,7 +11,7 @@ from armlab.effects.contract import ANGLE, Effect, Parameter
 from armlab.effects.library import EFFECT_IDS, effect_named
 from armlab.effects.parameters import ParameterValue
 from armlab.report.torque.sentences import finding_sentence
-from armlab.report.words import finding_in_words, variables_in_words
+from armlab.report.words import finding_in_words, how_it_falls, variables_in_words
 from problem.presets import load_arm
 
 ARM = load_arm("irb120-arm")
@@ -180,3 +180,10 @@ def test_a_sentence_with_a_field_that_nothing_fills_is_refused() -> None:
 def test_what_depends_on_nothing_that_is_known_depends_on_the_motion() -> None:
     assert variables_in_words(ARM, ()) == "the motion"
     assert variables_in_words(ARM, ("velocity_2", "time")) == "velocity of joint 2 and time"
+
+
+def test_where_an_error_falls_most_is_told_where_there_is_another_joint() -> None:
+    alone = replace(ARM, joints=ARM.joints[:1], links=None)
+    assert how_it_falls(ARM, 2, falls=True) == "falls most at joint 2"
+    assert how_it_falls(ARM, 2, falls=False) == "does not fall at joint 2"
+    assert how_it_falls(alone, 1, falls=True) == "falls"

@@ -23,6 +23,7 @@ from armlab.report.words import (
     effect_in_words,
     format_fixed,
     format_percent,
+    how_it_falls,
     is_negative_load,
     is_of_unknown_links,
     joint_unit,
@@ -172,9 +173,9 @@ class _Writer:
         left = next((each for each in self.account.left if each.joint == fit.joint), None)
         of = "torque" if unit == "N m" else "force"
         share = "" if left is None else f", {format_percent(left.share_of_torque)} of its {of}"
-        falls = "falls most" if fit.after < before else "does not fall"
+        falls = how_it_falls(arm, fit.joint, fit.after < before)
         return (
-            f"On held-out data the error {falls} at {joint_in_words(arm, fit.joint)}: from {format_fixed(before)} "
+            f"On held-out data the error {falls}: from {format_fixed(before)} "
             f"({compared_in_words(self.diagnosis.simulation)}) to {format_fixed(fit.after)} {unit}{share}."
         )
 

@@ -14,7 +14,7 @@ from armlab.effects.library import effect_named
 from armlab.report.account.summary import MAX_FIRST_WORDS, MAX_WORDS
 from armlab.report.motion.stated_numbers import StatedNumber, stated_causes, stated_numbers
 from armlab.report.torque.torque_verdict import LINE_WIDTH
-from armlab.report.words import LESS_MASS, SOMETHING_UNKNOWN, format_chance
+from armlab.report.words import LESS_MASS, SOMETHING_UNKNOWN, format_chance, how_it_falls
 from problem.arm import Arm
 from problem.joint_words import joint_in_words, joints_in_words
 
@@ -110,10 +110,10 @@ def _replay_sentence(diagnosis: MotionDiagnosis) -> str:
         return f"Its largest replay error is {1e3 * worst.replay_after:.3g} mrad ({joint_in_words(arm, worst.joint)})."
     best = max(diagnosis.errors, key=lambda each: (each.replay_before or 0.0) - each.replay_after)
     before, after = 1e3 * (best.replay_before or 0.0), 1e3 * best.replay_after
-    falls = "falls most" if after < before else "does not fall"
+    falls = how_it_falls(arm, best.joint, after < before)
     return (
-        f"On held-out runs the replay error {falls} at {joint_in_words(arm, best.joint)}: from {before:.3g} mrad to "
-        f"{after:.3g} mrad, {_share_of_motion(best)} of its motion."
+        f"On held-out runs the replay error {falls}: from {before:.3g} mrad to {after:.3g} mrad, "
+        f"{_share_of_motion(best)} of its motion."
     )
 
 
