@@ -27,9 +27,9 @@ def joint_in_table(arm: Arm, joint: int) -> str:
 
 
 def joints_in_words(arm: Arm, joints: Sequence[int]) -> str:
-    """`joints 1 and 3`, `shoulder_pan and elbow`, `all 6 joints`."""
+    """`joints 1 and 3`, `shoulder_pan and elbow`, `both joints`, `all 6 joints`."""
     if len(set(joints)) == len(arm) > 1:
-        return f"all {len(arm)} joints"
+        return f"{_every(arm)} joints"
     if len(joints) > 1 and all(_is_bare_number(arm, joint) for joint in joints):
         return f"joints {join_words([str(joint) for joint in joints])}"
     return join_words([joint_in_words(arm, joint) for joint in joints])
@@ -38,11 +38,15 @@ def joints_in_words(arm: Arm, joints: Sequence[int]) -> str:
 def links_in_words(arm: Arm, links: Sequence[int]) -> str:
     """`links 1 and 3`, `the links of shoulder_pan and elbow`, `all 6 links`: the links that these joints move."""
     if len(set(links)) == len(arm) > 1:
-        return f"all {len(arm)} links"
+        return f"{_every(arm)} links"
     plural = "s" if len(links) > 1 else ""
     if all(_is_bare_number(arm, link) for link in links):
         return f"link{plural} {join_words([str(link) for link in links])}"
     return f"the link{plural} of {join_words([joint_in_words(arm, link) for link in links])}"
+
+
+def _every(arm: Arm) -> str:
+    return "both" if len(arm) == 2 else f"all {len(arm)}"
 
 
 def _is_bare_number(arm: Arm, joint: int) -> bool:

@@ -35,6 +35,9 @@ def test_several_joints_and_links_are_a_list_of_names_or_numbers() -> None:
     assert joints_in_words(bare, [1, 3]) == "joints 1 and 3"
     assert joints_in_words(NAMED, [1, 2, 3]) == "all 3 joints"
     assert links_in_words(bare, [3, 2, 1]) == "all 3 links"
+    pair = replace(bare, joints=bare.joints[:2], links=None)
+    assert joints_in_words(pair, [1, 2]) == "both joints"
+    assert links_in_words(pair, [2, 1]) == "both links"
     assert links_in_words(bare, [2]) == "link 2"
     assert links_in_words(bare, [1, 3]) == "links 1 and 3"
     assert joints_in_words(NAMED, [1, 3]) == "shoulder_pan and joint 3"

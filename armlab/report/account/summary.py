@@ -117,9 +117,9 @@ class _Writer:
             (f"{of} {name}", f"{of} {self.cause_in_words(each)}")
             for of, name, each in zip(shares, names, others, strict=True)
         ]
-        unnamed = open_share(self.account)
-        if unnamed > 1 - STATED_SHARE:
-            forms.append((f"{100 * unnamed:.0f} % is unnamed",) * 2)
+        unexplained = open_share(self.account)
+        if unexplained > 1 - STATED_SHARE:
+            forms.append((f"{100 * unexplained:.0f} % stays unexplained",) * 2)
         return f"{list_while_short(f'{amount} % of the error comes from {self.cause_in_words(first)}', forms)}."
 
     def cause_in_words(self, cause: StatedCause) -> str:

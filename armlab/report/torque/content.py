@@ -105,7 +105,7 @@ def cause_table(diagnosis: Diagnosis) -> Table | None:
         share, size = format_share(each.share), _cause_size(diagnosis, each)
         rows.append([cause_name(each, own), place, size, share, _how_sure(own)])
     if open_share(account) > 1 - STATED_SHARE:
-        rows.append(["unnamed", "", "", format_share(open_share(account)), ""])
+        rows.append(["unexplained", "", "", format_share(open_share(account)), ""])
     return Table(["cause", "where", "how large", "of the error", "how sure"], rows, (0, 1, 2, 4), stacked=True)
 
 
