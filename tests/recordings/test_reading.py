@@ -21,7 +21,7 @@ from armlab.recordings.reading import search
 from armlab.recordings.reading.answer import Answer, lapse, read_rightly
 from armlab.recordings.reading.corrected import correct_recording, corrected_texts
 from armlab.recordings.reading.fit import Fitter
-from armlab.recordings.reading.judge import Errors, ReadingJudge, View
+from armlab.recordings.reading.judge import DOUBT_SHARE, Errors, ReadingJudge, View
 from armlab.recordings.reading.mistakes import (
     clock_error,
     contradicted_by,
@@ -30,6 +30,7 @@ from armlab.recordings.reading.mistakes import (
     late_torque,
     signs,
     take_back,
+    unit_error,
     units,
 )
 from armlab.recordings.reading.mistakes import spring as with_spring
@@ -392,6 +393,17 @@ def test_travel_speaks_for_the_unit_that_makes_it_usual(tmp_path: Path) -> None:
         assert len(degrees) == 3
         commonest = improbability(degrees[0].mistakes[-1], 3) / judge.independent
         assert {each.mistakes[-1].label for each in degrees if judge.improbability(each) < commonest} == wanted
+
+
+def test_travel_alone_names_nothing(tmp_path: Path) -> None:
+    """In a short recording few stretches tell something, and a joint that stands would be in another unit."""
+    judge = ReadingJudge.of(recording_with(tmp_path / "rig", scale(["q1"], 180 / np.pi)), TUNING)
+    assert judge is not None
+    judge.__dict__["independent"] = 2.0
+    start = read_as_is(judge.recording, ARM.parameters)
+    degrees = unit_error(start, 0, "position", 180 / np.pi)
+    told = improbability(degrees.mistakes[-1], 3) / 2 - judge.improbability(degrees)
+    assert told == pytest.approx(DOUBT_SHARE * TUNING.least_evidence)
 
 
 @pytest.mark.parametrize("seconds", [1.0, 2.5])

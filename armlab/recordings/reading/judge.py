@@ -264,10 +264,12 @@ class ReadingJudge:
     def improbability(self, reading: Reading, mistake: Mistake | None = None) -> float:
         """Of a mistake of a reading, its last one if left out, nats a stretch of time.
 
-        What it has to explain better than the commonest one, less what it makes of how far its joints travel.
+        What it has to explain better than the commonest one, less what it makes of how far its joints travel. That is
+        never more than a doubt needs: a joint that hardly moves may stand.
         """
         mistake = mistake or reading.mistakes[-1]
-        return (improbability(mistake, reading.joints) - self._travel_odds(reading, mistake)) / self.independent
+        travel = min(self._travel_odds(reading, mistake) / self.independent, DOUBT_SHARE * self.tuning.least_evidence)
+        return improbability(mistake, reading.joints) / self.independent - travel
 
     def _travel_odds(self, reading: Reading, mistake: Mistake) -> float:
         """Log odds of the travel of joints without and with a mistake that scales it, mean of the joints that turn."""
