@@ -52,20 +52,26 @@ class JointRows:
 class WeightedRows:
     """Rows of one joint with the covariance of drift and noise. variance: of the noise.
 
-    drift: (rows, count), random columns in units of the noise, those of known size last. weighted, weighted_target:
-    inverse covariance times the columns and the target.
+    drift: (rows, count), random columns in units of the noise, those of known size last. axes: (rows, count),
+    orthonormal, of the drift. kept: (count,), the share that whitening keeps along each. white: whitened columns, and
+    the target last.
     """
 
     rows: JointRows
     variance: float
     drift: Array
-    factor: tuple[Array, bool]
-    weighted: Array
-    weighted_target: Array
+    axes: Array
+    kept: Array
+    white: Array
 
-    def weigh(self, values: Array) -> Array:
-        """The inverse covariance times values (rows, ...)."""
-        return _weigh(values, self.drift, self.factor, self.variance)
+    def whiten(self, values: Array) -> Array:
+        """The symmetric root of the inverse covariance times values (rows, ...)."""
+        return _whiten(values, self.axes, self.kept, self.variance)
+
+    @cached_property
+    def weighted(self) -> Array:
+        """The inverse covariance times the columns, (rows, own)."""
+        return self.whiten(self.white[:, :-1])
 
     @cached_property
     def along_drift(self) -> Array:
@@ -84,13 +90,16 @@ def weigh_rows(rows: JointRows) -> WeightedRows:
     sizes = [part.shape[1] for part in rows.random]
     drift = np.column_stack([*rows.random, rows.known])
     drift = drift * np.sqrt([*np.repeat(ratios, sizes), *np.full(rows.known.shape[1], 1 / variance)])
-    factor = cho_factor(np.eye(drift.shape[1]) + drift.T @ drift, lower=True)
-    both = _weigh(np.column_stack([rows.columns, rows.target]), drift, factor, variance)
-    return WeightedRows(rows, variance, drift, factor, both[:, :-1], both[:, -1])
+    axes, sizes_along, _ = np.linalg.svd(drift, full_matrices=False)
+    kept = 1 / np.sqrt(1 + sizes_along**2)
+    white = _whiten(np.column_stack([rows.columns, rows.target]), axes, kept, variance)
+    return WeightedRows(rows, variance, drift, axes, kept, white)
 
 
-def _weigh(values: Array, drift: Array, factor: tuple[Array, bool], variance: float) -> Array:
-    return np.asarray((values - drift @ cho_solve(factor, drift.T @ values)) / variance)
+def _whiten(values: Array, axes: Array, kept: Array, variance: float) -> Array:
+    """Values times (1 + drift drift')^(-1/2), over the deviation of the noise: products of them are never negative."""
+    along = (axes.T @ values).T * (1 - kept)
+    return np.asarray((values - axes @ along.T) / np.sqrt(variance))
 
 
 def _restricted_variances(rows: JointRows) -> tuple[float, tuple[float, ...]]:
@@ -149,11 +158,9 @@ class MixedModel:
         """(size + 1, size + 1), weighted products of all columns and the target, which is last."""
         out = np.zeros((self.size + 1, self.size + 1))
         for each in self.joints:
-            own = np.column_stack([each.rows.columns, each.rows.target])
-            weighted = np.column_stack([each.weighted, each.weighted_target])
             place = np.append(each.rows.index, self.size)
-            out[np.ix_(place, place)] += own.T @ weighted
-        return (out + out.T) / 2
+            out[np.ix_(place, place)] += each.white.T @ each.white
+        return out
 
     @cached_property
     def precision(self) -> Array:
@@ -193,7 +200,7 @@ class MixedModel:
         for joint, each in enumerate(self.joints):
             used = np.flatnonzero(where[each.rows.index] >= 0)
             place = where[each.rows.index[used]]
-            noise = each.variance * each.weigh(self.errors(joint, chosen, values))
+            noise = each.variance * each.whiten(each.whiten(self.errors(joint, chosen, values)))
             products[:, place] += each.stretch_sums(self.stretches) @ (each.weighted[:, used] * noise[:, None])
             along = each.along_drift[:, used]
             constant = along[: len(each.rows.waves)][~each.rows.waves]
