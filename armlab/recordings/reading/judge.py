@@ -241,31 +241,31 @@ class ReadingJudge:
     def is_accepted(self, before: Trial, after: Trial, mistake: Mistake | None = None) -> bool:
         """Whether a reading explains so much more that a mistake may be named, its last one if left out."""
         mistake = mistake or after.reading.mistakes[-1]
-        return self.reaches(before, after, mistake, self.tuning.least_evidence)
+        return self._reaches(before, after, mistake, self.tuning.least_evidence)
 
     def is_doubt(self, before: Trial, after: Trial) -> bool:
         """Whether a reading that may not be named explains half as much."""
-        return self.reaches(before, after, after.reading.mistakes[-1], DOUBT_SHARE * self.tuning.least_evidence)
+        return self._reaches(before, after, after.reading.mistakes[-1], DOUBT_SHARE * self.tuning.least_evidence)
 
-    def reaches(self, before: Trial, after: Trial, mistake: Mistake, least: float) -> bool:
-        """Whether a reading has so much evidence; where the quick fits do not show most of it, it is not judged.
-
-        Of torque that is late it is asked beside friction that turns over a way, which may be all there is.
-        """
+    def _reaches(self, before: Trial, after: Trial, mistake: Mistake, least: float) -> bool:
+        """Whether a reading has so much evidence; where the quick fits do not show most of it, it is not judged."""
         before, after = self.compared(before, after, mistake)
         return self.may_explain(before, after, mistake, least) and self.evidence(before, after, mistake) >= least
 
     def compared(self, before: Trial, after: Trial, mistake: Mistake) -> tuple[Trial, Trial]:
-        """The two readings between which a mistake is judged."""
+        """The readings without and with a mistake, as they are compared.
+
+        Torque that is late is compared beside friction that turns over a way, which may be all there is.
+        """
         if mistake.effect in OF_TIME:
             return self.lagging(before.reading), self.lagging(after.reading)
         return before, after
 
     def improbability(self, reading: Reading, mistake: Mistake | None = None) -> float:
-        """Of a mistake of a reading, its last one if left out, nats a stretch of time.
+        """How improbable a mistake of a reading is, its last one if left out, nats a stretch of time.
 
-        What it has to explain better than the commonest one, less what it makes of how far its joints travel. That is
-        never more than a doubt needs: a joint that hardly moves may stand.
+        By its kind, less the log odds of how far its joints travel. Travel never counts for more than a doubt needs: a
+        joint that hardly moves may simply stand.
         """
         mistake = mistake or reading.mistakes[-1]
         travel = min(self._travel_odds(reading, mistake) / self.independent, DOUBT_SHARE * self.tuning.least_evidence)

@@ -52,14 +52,14 @@ class WrongReading:
     """The best wrong reading of a recording. folder: where it is; name: of the mistake that it would be.
 
     evidence: nats. mistakes: evidence for mistakes that can be seen, were they there. travels: of the joints that
-    turn, rad.
+    turn and do not stand, rad.
     """
 
     folder: RealFolder
     name: str
     evidence: float
     mistakes: tuple[float, ...]
-    travels: tuple[float, ...] = ()
+    travels: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def _best_wrong_reading(folder: RealFolder, recording: Recording, judge: Reading
     spread = tried[:: max(len(tried) // MISTAKES, 1)]
     mistakes = tuple(_evidence(judge, each, start, each) for each in spread if _is_seen(judge, each, start))
     travel = np.ptp(judge.judging.columns(start.reading).motion.position, axis=0)
-    turning = [joint.kind == "revolute" for joint in recording.arm.joints]
+    turning = np.array([joint.kind == "revolute" for joint in recording.arm.joints]) & (travel > 0)
     return WrongReading(folder, best.reading.mistakes[-1].label, evidence, mistakes, tuple(travel[turning].tolist()))
 
 
