@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from armlab.common.probabilities import normal_quantile
 from armlab.proof.open.real_folders.facts import (
     AllowedFact,
     ChangedFact,
@@ -34,11 +35,16 @@ DOUBT = re.compile(r"(?<!othing is )read wrongly|may be read|not be excluded|can
 
 @dataclass(frozen=True)
 class JudgedFact:
-    """How a fact was told. size_right: of a change, whether a number told touches its range."""
+    """How a fact was told.
+
+    size_right: of a change, whether a number told touches its range. width: of its interval over that of plain least
+    squares, both as shares of the change; None where there is none.
+    """
 
     rank: Rank
     strong: bool = False
     size_right: bool | None = None
+    width: float | None = None
 
 
 @dataclass(frozen=True)
@@ -195,8 +201,10 @@ def score_pair(known: PairFacts, verdict: ToldVerdict, file: FactsFile) -> Folde
             if finding.effect in effects and finding.places & {fact.joint, None} and said.rank != "below"
         ]
         rank = _best_rank(ranks)
-        size_right = _has_right_size(fact, verdict, file)
-        facts.append(JudgedFact(rank, size_right=size_right))
+        rows = _rows_of(fact, verdict, file)
+        size_right = _has_right_size(fact, rows)
+        widths = [width for row in rows if (width := _width_of(row, fact.errors)) is not None]
+        facts.append(JudgedFact(rank, size_right=size_right, width=min(widths, default=None)))
         if rank in NOT_TOLD:
             if not (known.same_is_fair and verdict.status != "changed"):
                 wrong.append(f"{rank}, at {fact.errors:g} standard errors")
@@ -229,20 +237,32 @@ def _covers_change(fact: ChangedFact | AllowedFact, finding: FindingAsTold, file
     return finding.effect in file.effects(fact.effect) and somewhere
 
 
-def _has_right_size(fact: ChangedFact, verdict: ToldVerdict, file: FactsFile) -> bool:
-    """Whether a changed parameter's interval touches what is known and is at most twice as wide."""
+def _rows_of(fact: ChangedFact, verdict: ToldVerdict, file: FactsFile) -> list[ToldChange]:
+    """The parameters that changed and may be that of a fact."""
     effects = file.effects(fact.effect)
-    rows = [
+    return [
         row
         for row in verdict.changes or ()
         if row.changed
         and row.joint in (fact.joint, None)
         and (row.effect in effects or (row.effect == "base_parameter" and not effects & file.friction))
     ]
+
+
+def _has_right_size(fact: ChangedFact, rows: Sequence[ToldChange]) -> bool:
+    """Whether a changed parameter's interval touches what is known and is at most twice as wide."""
     sizes = [_ratio_of(row) if fact.factor is not None else _difference_of(row) for row in rows]
     low, high = _known_size(fact)
     widest = MAX_INTERVAL_RATIO * (high - low)
     return any(size is not None and _touches(size, (low, high)) and size[1] - size[0] <= widest for size in sizes)
+
+
+def _width_of(row: ToldChange, errors: float) -> float | None:
+    """The width of a change's interval over that of plain least squares, which sees it by so many standard errors."""
+    if row.difference_ci95 is None or row.old is None or row.new is None or row.new == row.old:
+        return None
+    low, high = row.difference_ci95
+    return errors * (high - low) / (2 * normal_quantile(0.975) * abs(row.new - row.old))
 
 
 def _known_size(fact: ChangedFact) -> tuple[float, float]:

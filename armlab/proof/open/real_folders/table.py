@@ -153,8 +153,10 @@ def _singles_line(scores: Sequence[FolderScore]) -> str:
 
 def _pairs_line(scores: Sequence[FolderScore]) -> str:
     facts = [fact for each in scores for fact in each.facts]
+    widths = ", ".join(f"{fact.width:.1f}" for fact in facts if fact.width is not None)
     return (
         f"pairs: {_ranks_text(scores)}; size right {sum(bool(fact.size_right) for fact in facts)} of {len(facts)}; "
+        f"intervals over those of plain least squares {widths or '–'}; "
         f"WRONG {_sum(len(each.wrong) for each in scores)}, extra {_sum(len(each.extra) for each in scores)}"
     )
 
