@@ -115,7 +115,7 @@ def test_a_change_needs_a_name_and_a_size_that_touches_the_known_factor() -> Non
     wide = judge_pair(known, finding("payload", 1), changes=[row | {"difference_ci95": [0.0, 3.0]}])
     assert wide.wrong == ("no size inside 2 to 3",)
     assert right.facts[0].width is None
-    assert wide.facts[0].width == pytest.approx(9 * 3.0 / 1.5 / (2 * 1.96))
+    assert wide.facts[0].width == pytest.approx(9 * 3.0 / 1.5 / (2 * 1.96), rel=1e-3)
     assert judge_pair(known, status="same").wrong == ("missed, at 9 standard errors",)
     assert judge_pair(known | {"same_is_fair": True}, status="same").wrong == ()
 

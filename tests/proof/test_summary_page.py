@@ -14,7 +14,7 @@ RESULTS = Path(__file__).parents[2] / "results" / "proof"
 
 
 def _cells(page: str, start: str) -> list[str]:
-    (line,) = (line for line in page.splitlines() if line.startswith(f"| {start} |"))
+    line = next(line for line in page.splitlines() if line.startswith(f"| {start} |"))
     return [cell.strip() for cell in line.strip("|").split("|")]
 
 
@@ -44,3 +44,13 @@ def test_what_is_missed_is_bold_and_a_tier_that_is_not_there_has_no_column(tmp_p
 def test_a_folder_without_a_log_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"log\.jsonl"):
         write_summary(tmp_path)
+
+
+def test_tiers_that_count_shares_have_tables_of_their_own(tmp_path: Path) -> None:
+    figures = {"nulls_a_false_reading_mistake": [0.02, 0.01, 0.07, 100], "nulls_a_false_name": [None, None, None, 0]}
+    entry = {"set": "field", "commit": "0123456789", "cases": 100, "score": {"field": figures}}
+    (tmp_path / "log.jsonl").write_text(json.dumps(entry), encoding="utf-8")
+    page = write_summary(tmp_path).read_text(encoding="utf-8")
+    assert "Commit 0123456, 100 cases" in page
+    assert _cells(page, "nulls a false reading mistake")[1:] == ["at most 1%", "2 % (1 to 7), 100"]
+    assert _cells(page, "nulls a false name")[1:] == ["-", "-"]

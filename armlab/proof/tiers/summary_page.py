@@ -4,21 +4,25 @@ It is made from what the tiers have written below the folder of the results. A t
 """
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
+from armlab.proof.blind.field import field_score
 from armlab.proof.blind.log_page import LOG_FILE, LOG_PAGE
+from armlab.proof.blind.pairs import pair_score
 from armlab.proof.blind.real.real_score import CASES_TABLE, read_tables, real_measures
 from armlab.proof.blind.score.distance import SHARES, Distance, read_oracle_table
 from armlab.proof.blind.score.measures import MEASURE_TEXTS, MIN_NAMED_MULTIPLE, Measure
 from armlab.proof.blind.score.score_page import engines_section, format_aims, format_measure
 from armlab.proof.blind.score.scoring import SCORE_FILE, read_rows
+from armlab.proof.blind.score.share import share_id
 from armlab.proof.blind.servo.servo_score import MOTION_FILE, read_motion_measures
 from armlab.proof.blind.setup.setup_score import SETUP_FILE, read_setup_measures
 
@@ -85,6 +89,7 @@ def write_summary(results: Path) -> Path:
         "The last judged run of each tier.",
         markdown_table(("measure", "wanted", *columns), [*_commit_rows(results, columns), *rows]),
         HOW_TO_READ,
+        *_share_sections(results),
         *_engines(results),
     )
     (written,) = write_texts({SUMMARY_PAGE: page}, results)
@@ -152,6 +157,40 @@ def _commit_rows(results: Path, columns: Columns) -> Iterator[list[str]]:
     }
     yield ["commit", "-", *(last.get(sets[name], "-") for name in columns)]
     yield ["commit of the nulls", "-", *(last.get(null_sets.get(name, ""), "-") for name in columns)]
+
+
+def _share_sections(results: Path) -> Iterator[str]:
+    """The last judged run of the tiers that count shares alone."""
+    lines = (results / LOG_FILE).read_text(encoding="utf-8").splitlines()
+    last = {entry["set"]: entry for entry in map(json.loads, lines)}
+    if "changes" in last:
+        found = last["changes"]["score"]["changes"]
+        halves = ("", ", simulated", ", field")
+        rows = [
+            (name, aim, *(_share_cell(found.get(share_id(f"{name}{half}"))) for half in halves))
+            for name, aim in pair_score.WANTED.items()
+        ]
+        yield _share_heading("Pairs of recordings", last["changes"])
+        yield markdown_table(("measure", "wanted", "all", "simulated", "field"), rows)
+    if "field" in last:
+        aims = {share_id(name): aim for name, aim in field_score.WANTED.items()}
+        found = last["field"]["score"]["field"].items()
+        yield _share_heading("Recordings that resemble real ones", last["field"])
+        rows = [(id.replace("_", " "), aims.get(id, "-"), _share_cell(figure)) for id, figure in found]
+        yield markdown_table(("measure", "wanted", "found"), rows)
+
+
+def _share_heading(title: str, entry: Mapping[str, Any]) -> str:
+    name, commit = entry["set"], entry["commit"][:7]
+    return f"## {title}\n\nCommit {commit}, {entry['cases']} cases ([score]({name}/{name}.md))."
+
+
+def _share_cell(figure: Sequence[Any] | None) -> str:
+    """A share of the log: its value, its interval, and the number that it was counted on."""
+    if figure is None or figure[0] is None:
+        return "-"
+    value, low, high, number = figure
+    return f"{100 * value:.3g} % ({100 * low:.3g} to {100 * high:.3g}), {number}"
 
 
 def _engines(results: Path) -> list[str]:

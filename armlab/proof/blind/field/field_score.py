@@ -21,6 +21,8 @@ from armlab.proof.blind.score.cases import UNKNOWN_NAME, VALID_STATUSES, is_indi
 from armlab.proof.blind.score.share import Share
 
 MAX_CLASS = 3  # names
+FALSE_READING, FALSE_NAME = "a false reading mistake", "a false name"
+WANTED = {f"nulls: {FALSE_READING}": "at most 1%"}
 VERDICT_FILE = "verdict.json"
 LEAST_STRENGTH = 0.7  # of a hidden effect that counts
 DOUBT = re.compile(r"(?<!othing is )read wrongly|may be read|not be excluded|cannot (?:be excluded|exclude)")
@@ -127,8 +129,8 @@ def measure_field(outcomes: Sequence[FieldOutcome]) -> Iterator[Share]:
     for name, own in (("nulls", kinds.get("null", [])), ("hidden effects", kinds.get("hidden", []))):
         if own:
             misread = sum(bool(each.false_setup) or each.doubt for each in own)
-            yield Share(f"{name}: a false reading mistake", misread, len(own))
-            yield Share(f"{name}: a false name", sum(bool(each.false) for each in own), len(own))
+            yield Share(f"{name}: {FALSE_READING}", misread, len(own))
+            yield Share(f"{name}: {FALSE_NAME}", sum(bool(each.false) for each in own), len(own))
             yield Share(f"{name}: inconclusive", sum(each.status == "inconclusive" for each in own), len(own))
     if single:
         missing = sum(each.status not in VALID_STATUSES for each in single)

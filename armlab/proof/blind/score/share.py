@@ -32,5 +32,9 @@ class Share:
         """As the log of judged runs has it: id, value with its interval, number of cases."""
         low, high = self.interval
         value = self.hits / self.number if self.number else None
-        name = re.sub(r"[^a-z0-9]+", "_", self.name.lower()).strip("_")
-        return {"id": name, "value": value, "low": low, "high": high, "number": self.number}
+        return {"id": share_id(self.name), "value": value, "low": low, "high": high, "number": self.number}
+
+
+def share_id(name: str) -> str:
+    """The name of a share in the log of judged runs."""
+    return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
