@@ -26,7 +26,7 @@ PAYLOAD_FACTS = Effect(
     figures="{mass} at {centre} from {frame}",
     law=r"\Delta\tau = Y_l(q, \dot q, \ddot q) \; \phi(\text{mass}, \text{centre}, \text{inertia})",
     where="link",
-    experiment="repeat the motion without the payload",
+    experiment="repeat the motion with nothing attached, or weigh what the link carries",
 )
 INERTIAL_ERROR_FACTS = Effect(
     "inertial_parameter_error",

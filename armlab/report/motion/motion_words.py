@@ -47,8 +47,9 @@ def summary_of(diagnosis: MotionDiagnosis) -> str:
     last = _replay_sentence(diagnosis)
     left = MAX_WORDS - len(first.split()) - len(last.split())
     shown = list[str]()
-    for each in sorted(stated, key=lambda each: -each.share)[:MAX_FIGURES]:
-        phrase = _figure_at_place(diagnosis.simulation.arm, each.finding)
+    for cause in stated_causes(stated)[:MAX_FIGURES]:
+        largest = max((stated[at] for at in cause.findings), key=lambda each: each.share)
+        phrase = _figure_at_place(diagnosis.simulation.arm, largest.finding)
         if len("; ".join([*shown, phrase]).split()) > left:
             break
         shown.append(phrase)

@@ -130,7 +130,18 @@ def _cause_size(diagnosis: Diagnosis, cause: StatedCause) -> str:
         if numbers := claim_figures(each.claim, diagnosis.simulation):
             joint = each.claim.joint
             texts.append(f"{joint_in_words(arm, joint)}: {numbers}" if joint and len(places) > 1 else numbers)
-    return "; ".join(texts)
+    return "; ".join(texts) or _size_by_removal(diagnosis, own)
+
+
+def _size_by_removal(diagnosis: Diagnosis, own: Sequence[StatedFinding]) -> str:
+    """What a cause without numbers is worth at the joint that misses it most."""
+    removals = [each.claim.removal for each in own if each.claim.removal is not None]
+    if not removals:
+        return ""
+    most, arm = max(removals, key=lambda each: each.growth), diagnosis.simulation.arm
+    without, joint = most.rms * (1 + most.growth), joint_in_words(arm, most.joint + 1)
+    unit = joint_unit(arm, most.joint)
+    return f"error of {joint}: {format_number(without)} {unit} without, {format_number(most.rms)} {unit} with it"
 
 
 def _how_sure(own: Sequence[StatedFinding]) -> str:
