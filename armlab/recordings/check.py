@@ -39,6 +39,7 @@ from problem.impossible_bodies import find_impossible_bodies
 from problem.joint_words import joint_in_words, joints_in_words
 from problem.simulator_check import check_with_mujoco, left_out_of_urdf
 
+RESTING_SHARE = 1e-3  # of the speed of the fastest joint of a run: a joint that is slower rests
 MIN_FROZEN_TIME_S = 0.25  # a torque that repeats to the last digit for so long while its joint moves
 
 
@@ -143,7 +144,8 @@ def _check_velocity(run: MotionRun, arm: Arm, joint: int) -> list[Finding]:
     likeness = np.array([correlation(velocity, slope) for slope in slopes.T])
     if likeness[joint] >= MIN_SLOPE_CORRELATION:
         return _check_velocity_scale(run, velocity, slopes[:, joint], arm, joint)
-    if np.ptp(slopes[:, joint]) == 0:
+    fastest = float(slopes.std(axis=0).max())
+    if max(slopes[:, joint].std(), velocity.std()) <= RESTING_SHARE * fastest:
         return []
     best, own = int(np.argmax(np.abs(likeness))), joint_in_words(arm, joint + 1)
     if abs(likeness[best]) < MIN_SLOPE_CORRELATION:

@@ -7,6 +7,7 @@ from armlab.recordings.recording import AnyRun, Finding
 
 TURN_RAD = 2 * np.pi
 ENCODER_SIGNALS = ("position", "link_position", "reference_position", "simulated_position")
+ROUNDING = 1e-6  # of a turn
 MIN_STEP_TURNS = 1e-3  # of a turn, at rest
 PARTS_OF_TURN = (1, 2, 3, 4)  # encoders that repeat within a turn
 FULL_SHARE = 0.9  # of its period that such an encoder has run through, and never more than all of it
@@ -43,14 +44,18 @@ def _unwrap_channel(run: AnyRun, name: str, channel: int) -> AnyRun:
 
 
 def _wraps(signal: Array, period: float) -> Array | None:
-    """Periods by which a signal jumps between two samples, (samples - 1,); None where it does not or moves as fast."""
+    """Periods by which a signal jumps between two samples, (samples - 1,); None where it does not or moves as fast.
+
+    A signal of whole periods alone counts them: it moves by nothing else.
+    """
     steps = np.diff(signal)
     turns = np.rint(steps / period)
     moved = np.abs(steps - period * turns)
     # whole periods aside, most steps are motion
     ordinary = max(3 * float(np.quantile(moved, 0.98)), MIN_STEP_TURNS * period)
     wraps = (turns != 0) & (moved <= ordinary)
-    return None if not wraps.any() or ordinary > period / 2 else np.where(wraps, turns, 0.0)
+    counts = bool(moved.max(initial=0.0) < ROUNDING * period)
+    return None if counts or not wraps.any() or ordinary > period / 2 else np.where(wraps, turns, 0.0)
 
 
 DIRECTION_BITS = range(8, 16)

@@ -13,6 +13,7 @@ from armlab.diagnosis.torque.names.findings import (
     finding_shares,
     leading_causes,
     statement_of,
+    told_causes,
 )
 from armlab.effects.library import effect_named
 
@@ -55,11 +56,13 @@ class StatedFinding:
 
 @dataclass(frozen=True, eq=False)
 class Account:
-    """causes: the largest first; leading: those that the summary tells. findings: not minor, the largest share first;
-    minor: the others. friction: of each joint with friction among the findings. left: of each joint.
+    """causes: the largest first. told: by the parts alone about which a finding is told; leading: those of them that
+    the summary tells. findings: not minor, the largest share first; minor: the others. friction: of each joint with
+    friction among the findings. left: of each joint.
     """
 
     causes: tuple[StatedCause, ...] = ()
+    told: tuple[StatedCause, ...] = ()
     leading: tuple[StatedCause, ...] = ()
     findings: tuple[StatedFinding, ...] = ()
     minor: tuple[StatedFinding, ...] = ()
@@ -84,12 +87,12 @@ def account_of(diagnosis: Diagnosis) -> Account:
         for number, (claim, share) in enumerate(zip(claims, shares, strict=True))
     ]
     every.sort(key=lambda each: -each.share)
-    causes = causes_of(parts)
-    stated = [each for each in causes if not all(claims[number].minor for number in each.findings)]
+    told = told_causes(parts, claims)
     rubbing = {each.claim.joint for each in every if each.is_friction}
     return Account(
-        causes=causes,
-        leading=leading_causes(stated),
+        causes=causes_of(parts),
+        told=told,
+        leading=leading_causes(told),
         findings=tuple(each for each in every if not each.claim.minor),
         minor=tuple(each for each in every if each.claim.minor),
         friction=tuple(each for each in diagnosis.friction if each.joint in rubbing),

@@ -101,7 +101,7 @@ def _leading_phrase(comparison: Comparison, named: NamedChange) -> str:
         return f"{where} ({whole})"
     if not named.changes:
         return f"{where}: {named.equation}"
-    return f"{where} ({_amount(min(named.changes, key=lambda each: each.p_value), short=True)})"
+    return f"{where} ({_amount(max(named.changes, key=_sureness), short=True)})"
 
 
 def _all_friction(comparison: Comparison, named: NamedChange) -> str | None:
@@ -121,7 +121,13 @@ def change_phrase(comparison: Comparison, named: NamedChange) -> str:
 
 def _amounts(comparison: Comparison, named: NamedChange) -> list[str]:
     whole = _all_friction(comparison, named)
-    return [*([] if whole is None else [whole]), *(_amount(each) for each in named.changes)]
+    return [*([] if whole is None else [whole]), *map(_amount, sorted(named.changes, key=_sureness, reverse=True))]
+
+
+def _sureness(change: Change) -> float:
+    """How large a difference is beside its interval: a law may have numbers that did not change."""
+    low, high = change.interval
+    return abs(change.difference) / max(high - low, 1e-300)
 
 
 def _names_phrase(arm: Arm, named: NamedChange) -> str:
@@ -185,7 +191,7 @@ def _signed(percent: float) -> str:
 def detectable_sentence(comparison: Comparison, words: int = MAX_WORDS) -> str:
     """The smallest changes that would have been named, of the usual kinds: the middle one of the joints.
 
-    `twofold` for a level that would have to change by more than itself. words: no more than these.
+    A level that would have to change by more than itself is told as a multiple. words: no more than these.
     """
     parts = []
     for effect in SEEN_EFFECTS:
@@ -199,7 +205,8 @@ def detectable_sentence(comparison: Comparison, words: int = MAX_WORDS) -> str:
         share = detectable_share(middle)
         size = f"{format_number(middle.detectable, 2)} {format_unit(middle.unit)}"
         size = size if share is None else f"{format_number(100 * share, 2)} %"
-        parts.append(f"{effect_in_words(effect)} {'twofold' if share is not None and share > 1 else size}")
+        size = size if share is None or share <= 1 else f"{format_number(1 + share, 2)}-fold"
+        parts.append(f"{effect_in_words(effect)} {size}")
     while parts:
         sentence = f"Smaller changes than these would not have been seen (middle of all joints): {', '.join(parts)}."
         if len(sentence.split()) <= words:

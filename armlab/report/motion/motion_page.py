@@ -68,7 +68,8 @@ def joint_table(diagnosis: MotionDiagnosis) -> Table:
         stated = [one for one in stated_numbers(diagnosis) if not one.minor]
         own = [one for one in stated if one.finding.joint == each.joint]
         words = "; ".join(finding_with_numbers(one.finding) for one in own)
-        sure = "; ".join(format_chance(one.statement.probability) for one in own)
+        chances = [one.naming.probability_of(one.finding.effect, one.finding.joint) for one in own]
+        sure = "; ".join(format_chance(each) for each in chances)
         before = "" if each.replay_before is None else f"{1e3 * each.replay_before:.3g} → "
         errors = f"{before}{1e3 * each.replay_after:.3g} mrad"
         rows.append((joint_in_table(arm, each.joint), words, sure, errors))

@@ -95,11 +95,10 @@ def error_note(diagnosis: Diagnosis, data: ShownResiduals) -> str:
 def cause_table(diagnosis: Diagnosis) -> Table | None:
     """The causes that are told, the largest first: where, how large, of the error, how sure; None without any."""
     account = account_of(diagnosis)
-    told = [each for each in account.causes if account.findings_of(each)]
-    if not told:
+    if not account.told:
         return None
     rows = []
-    for each in told:
+    for each in account.told:
         own = account.findings_of(each)
         place = cause_place(diagnosis, each, own) or _place_of_whole_arm(diagnosis, each, own)
         share, size = format_share(each.share), _cause_size(diagnosis, each)

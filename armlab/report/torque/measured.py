@@ -6,7 +6,7 @@ import numpy as np
 
 from armlab.common.report.page import Table
 from armlab.common.report.wording import format_number, join_words
-from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.result import MAX_MINOR_GROWTH, Diagnosis
 from armlab.diagnosis.torque.rows.simulation import Simulation
 from armlab.effects.contract import UNKNOWN, Effect
 from armlab.effects.drive import ROTOR_INERTIA_FACTS
@@ -14,7 +14,7 @@ from armlab.effects.friction import COULOMB_FACTS, VISCOUS_FACTS
 from armlab.effects.library import effect_named
 from armlab.effects.links import PAYLOAD_FACTS
 from armlab.report.account.account import Account, StatedFinding, account_of
-from armlab.report.account.summary import format_speed, friction_in_words
+from armlab.report.account.summary import errors_at_start, format_speed, friction_in_words
 from armlab.report.torque.sentences import claim_figures, finding_sentence, number_in_words
 from armlab.report.words import (
     effect_in_words,
@@ -91,9 +91,10 @@ def _left_cell(account: Account, joint: int, arm: Arm) -> str:
 
 
 def joints_without_finding(diagnosis: Diagnosis) -> str:
-    """`Nothing was found at joints 1, 2 and 5.`; empty where each has a finding."""
+    """`Nothing of practical size was found at joints 1, 2 and 5.`; not of a joint that a finding elsewhere mends."""
     guilty = {each.claim.joint for each in account_of(diagnosis).findings if each.claim.effect != PAYLOAD_FACTS.id}
-    arm = diagnosis.simulation.arm
+    arm, start = diagnosis.simulation.arm, errors_at_start(diagnosis)
+    guilty |= {each.joint for each in diagnosis.fit if start[each.joint - 1] > (1 + MAX_MINOR_GROWTH) * each.after}
     free = [number for number in range(1, len(arm) + 1) if number not in guilty]
     return f"Nothing of practical size was found at {joints_in_words(arm, free)}." if free else ""
 
@@ -154,9 +155,9 @@ def doubt_in_words(found: StatedFinding) -> str:
 
 
 def body_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Each payload with its mass, and where its centre of mass is in the frame of its joint."""
+    """Each payload that has no other name, with its mass, and its centre of mass in the frame of its joint."""
     return [
         f"{finding_sentence(each.claim, diagnosis.simulation)}."
         for each in account_of(diagnosis).findings
-        if each.claim.effect == PAYLOAD_FACTS.id
+        if each.claim.effect == PAYLOAD_FACTS.id and each.statement.kind == "name"
     ]

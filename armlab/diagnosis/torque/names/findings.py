@@ -11,7 +11,7 @@ from typing import Literal
 from armlab.common.told import MAX_CLASS_NAMES, MIN_CAUSE_PROBABILITY, MIN_NAME_PROBABILITY
 from armlab.diagnosis.result import Claim, Member, Part
 from armlab.diagnosis.torque.evidence.evidence import SMALLEST_CHANGE
-from armlab.diagnosis.torque.predict.parts import UNKNOWN_CAUSE, cause_of, is_in_no_model
+from armlab.diagnosis.torque.predict.parts import UNKNOWN_CAUSE, is_in_no_model
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 
@@ -100,6 +100,11 @@ def causes_of(parts: Sequence[Part]) -> tuple[StatedCause, ...]:
     return tuple(sorted(causes, key=lambda each: -each.share))
 
 
+def told_causes(parts: Sequence[Part], claims: Sequence[Claim]) -> tuple[StatedCause, ...]:
+    """The causes by the parts alone about which a finding is told."""
+    return causes_of([each for each in parts if not all(claims[number].minor for number in each.claims)])
+
+
 def leading_causes(causes: Sequence[StatedCause]) -> tuple[StatedCause, ...]:
     """The largest causes, until they explain nearly all; what explains less than the rest that may stay open is none.
 
@@ -156,8 +161,8 @@ def without_lesser_unknowns(claims: Sequence[Claim], parts: Sequence[Part]) -> t
 def with_minor_ones(claims: Sequence[Claim], parts: Sequence[Part]) -> tuple[Claim, ...]:
     """The findings, those marked that are minor.
 
-    Minor are all findings about a part that nobody would miss; of a joint or a link those beyond two, of which
-    the most missed one of each cause comes first; and those of causes beyond the four largest.
+    Minor are all findings about a part that nobody would miss; of a joint or a link those beyond the two that explain
+    most; and those of causes beyond the four largest.
     """
     out = list(claims)
     for part in parts:
@@ -169,19 +174,13 @@ def with_minor_ones(claims: Sequence[Claim], parts: Sequence[Part]) -> tuple[Cla
     for number, claim in enumerate(out):
         if not claim.minor:
             places.setdefault((effect_named(claim.effect).where == "link", claim.joint), []).append(number)
+    shares = finding_shares(parts, len(claims))
     for numbers in places.values():
-        _mark(out, _by_weight(numbers, out)[MAX_STATED_OF_JOINT:])
-    told = [each for each in causes_of(parts) if not all(out[number].minor for number in each.findings)]
-    for each in told[MAX_STATED_CAUSES:]:
+        numbers.sort(key=lambda each: (-shares[each], -_growth(out[each])))
+        _mark(out, numbers[MAX_STATED_OF_JOINT:])
+    for each in told_causes(parts, out)[MAX_STATED_CAUSES:]:
         _mark(out, each.findings)
     return tuple(out)
-
-
-def _by_weight(numbers: Sequence[int], claims: Sequence[Claim]) -> list[int]:
-    """Findings of one place: of each cause the one that is missed most, then the others, those missed most first."""
-    missed = sorted(numbers, key=lambda each: -_growth(claims[each]))
-    first = {cause_of(effect_named(claims[each].effect)): each for each in reversed(missed)}.values()
-    return sorted(missed, key=lambda each: each not in first)
 
 
 def _growth(claim: Claim) -> float:
