@@ -54,25 +54,28 @@ def check_channels(run: MotionRun, arm: Arm) -> tuple[Finding, ...]:
     return tuple(findings)
 
 
-def signs_of_wrong_reading(recording: Recording) -> tuple[Finding, ...]:
+SIGNS = (
+    "joint_names",
+    "rate",
+    "beyond_limits",
+    "velocity_mismatch",
+    "lost_rows",
+    "standstill",
+    "encoder_period",
+    "unsigned_current",
+    NO_TORQUE,
+)  # kinds of findings that are cheap signs of a mistake in the reading
+
+
+def signs_of_wrong_reading(recording: Recording | MotionRecording) -> tuple[Finding, ...]:
     """Warnings about names, clock, limits and standstill, each once: cheap signs of a mistake in the reading."""
     found = [*recording.findings]
     for run in recording.runs:
         found += [*run.findings, *check_channels(run, recording.arm)]
-    links = recording.arm.parameters if recording.arm.links is not None else None
-    found += compare_standstill(recording, links, ReadingTuning())
-    kinds = (
-        "joint_names",
-        "rate",
-        "beyond_limits",
-        "velocity_mismatch",
-        "lost_rows",
-        "standstill",
-        "encoder_period",
-        "unsigned_current",
-        NO_TORQUE,
-    )
-    first = {(each.kind, each.joint): each for each in reversed(found) if each.kind in kinds}
+    if isinstance(recording, Recording):
+        links = recording.arm.parameters if recording.arm.links is not None else None
+        found += compare_standstill(recording, links, ReadingTuning())
+    first = {(each.kind, each.joint): each for each in reversed(found) if each.kind in SIGNS}
     return tuple(reversed(first.values()))
 
 

@@ -11,6 +11,7 @@ from armlab.diagnosis.motion.witness import CurrentWitness
 from armlab.diagnosis.torque.names.findings import FRICTION
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
+from armlab.recordings.check import signs_of_wrong_reading
 from armlab.report.account.summary import MAX_FIRST_WORDS, MAX_WORDS
 from armlab.report.motion.stated_numbers import StatedNumber, stated_causes, stated_numbers
 from armlab.report.torque.torque_verdict import LINE_WIDTH
@@ -30,6 +31,7 @@ NUMBER_WORDS = {
 }
 MADE_BY = " of the replay error that can be explained is made by"
 SHOWN_RISE = 1.02  # of a replay error: a smaller one is none
+MAX_WARNINGS = 3
 MAX_FIGURES = 2  # of the second sentence
 
 
@@ -123,8 +125,9 @@ def _share_of_motion(error: ReplayError) -> str:
 
 
 def remarks(diagnosis: MotionDiagnosis) -> list[str]:
-    """Joints of which nothing can be said, and stretches in which something else moves the arm."""
-    return [each for each in (_silent_sentence(diagnosis), _odd_sentence(diagnosis)) if each]
+    """Signs of a wrong reading, joints of which nothing can be said, and stretches that something else moves."""
+    signs = [f"Warning: {each.text}" for each in signs_of_wrong_reading(diagnosis.recording)[:MAX_WARNINGS]]
+    return [*signs, *(each for each in (_silent_sentence(diagnosis), _odd_sentence(diagnosis)) if each)]
 
 
 def _silent_sentence(diagnosis: MotionDiagnosis) -> str:
