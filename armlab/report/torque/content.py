@@ -6,6 +6,7 @@ from importlib.metadata import version
 
 from markupsafe import Markup
 
+from armlab.common.errors import InputError
 from armlab.common.report.page import Table
 from armlab.common.report.wording import count_of, format_number, join_words
 from armlab.diagnosis.result import Claim, Diagnosis
@@ -13,7 +14,8 @@ from armlab.diagnosis.torque.names.findings import FRICTION, STATED_SHARE, State
 from armlab.diagnosis.torque.predict.parts import LINKS
 from armlab.diagnosis.torque.rows.simulation import Simulation
 from armlab.effects.library import effect_named
-from armlab.identification.export import has_place_in_simulator
+from armlab.identification.export import bodies, build_simulator_model, has_place_in_simulator
+from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER
 from armlab.recordings.recording import Recording
 from armlab.report.account.account import StatedFinding, account_of, finding_errors
@@ -343,9 +345,23 @@ def _motion_may_tell(claim: Claim) -> bool:
 def _export_text(diagnosis: Diagnosis) -> str:
     if diagnosis.simulation.inertial is None or diagnosis.is_plain:
         return "A simulator needs masses of links: give the robot file nominal `links`, and diagnose again."
+    if diagnosis.model is not None and not _is_exportable(diagnosis.model):
+        return (
+            "A simulator takes links that can be bodies, and these are fitted freely: `armlab identify RECORDING "
+            "--method physical` fits such links."
+        )
     missing = dict.fromkeys(claim.effect for claim in diagnosis.claims if not _has_place_in_simulator(claim))
     lost = f" That has no place for {join_words([effect_in_words(each) for each in missing])}." if missing else ""
     return f"Where a simulator needs it: `armlab model export model.yaml model.xml` writes MJCF.{lost}"
+
+
+def _is_exportable(model: TorqueModel) -> bool:
+    """Whether a simulator takes its links."""
+    try:
+        bodies(build_simulator_model(model))
+    except InputError:
+        return False
+    return True
 
 
 def _has_place_in_simulator(claim: Claim) -> bool:
