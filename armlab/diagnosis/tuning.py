@@ -292,6 +292,7 @@ class SurrogateTuning:
     )
     swing_range: float = tuned(50.0, "fastest of them over slowest", least=1.1)
     swings: int = tuned(14, "how many of them, in equal ratios", "springs", least=2)
+    min_noise_gain: float = tuned(0.02, "gain of a prediction that is taken out of the noise", "of the held-out error")
     noise_level: float = tuned(
         0.05, "below it a prediction counts as no noise: else whitening would hide what is slow", "p-value", most=1.0
     )

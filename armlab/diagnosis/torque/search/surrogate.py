@@ -113,7 +113,7 @@ def predict_structure(
     turned = residual[learn] - np.choose(folds[learn], [each[learn] for each in in_turn])
     inside = held_out_gain(residual[learn], turned, numbers[learn])
     gains = (validated, inside)
-    sure = any(each.share > tuning.least_gain and each.chance < tuning.noise_level for each in gains)
+    sure = any(each.share > tuning.min_noise_gain and each.chance < tuning.noise_level for each in gains)
     return predicted if sure else np.zeros(len(residual))
 
 
