@@ -265,22 +265,13 @@ class SurrogateTuning:
     )
     block_s: float = tuned(0.5, "length of the stretches that are compared on held-out data", "s", least=1e-3)
     min_blocks: int = tuned(12, "least number of these stretches", "stretches", least=3)
-    hats: int = tuned(8, "piecewise linear functions of a variable", "functions", least=3)
-    fine_hats: int = tuned(16, "the same, where one variable matters most", "functions", least=3)
-    position_hats: int = tuned(
-        12, "piecewise linear functions of a position that multiply the velocity", "functions", least=3
+    hats: int = tuned(
+        8,
+        "piecewise linear functions of a variable: twice as many where it matters most, three times of a position, "
+        "half as many of each of two",
+        "functions",
+        least=4,
     )
-    fine_position_hats: int = tuned(
-        24, "piecewise linear functions of a position alone or with the sign", "functions", least=3
-    )
-    product_positions: int = tuned(
-        4, "piecewise linear functions of each of two positions, for products", "functions", least=3
-    )
-    product_speeds: int = tuned(
-        5, "piecewise linear functions of speed and of acceleration, for products", "functions", least=3
-    )
-    waves: int = tuned(16, "random waves of a pair of variables", "waves", least=2)
-    few_joints: int = tuned(4, "an arm with more joints gets half as many waves a pair", "joints")
     max_pairs: int = tuned(6, "pairs of other joints that get waves", "pairs")
     sign_widths: tuple[float, ...] = tuned(
         (0.005, 0.02, 0.06, 0.2, 0.6),
@@ -301,7 +292,6 @@ class SurrogateTuning:
     )
     swing_range: float = tuned(50.0, "fastest of them over slowest", least=1.1)
     swings: int = tuned(14, "how many of them, in equal ratios", "springs", least=2)
-    swing_damping: float = tuned(0.12, "their damping ratio: each answers as far as the next one", least=1e-6)
     min_noise_gain: float = tuned(0.02, "gain of a prediction that is taken out of the noise", "of the held-out error")
     noise_level: float = tuned(
         0.05, "below it a prediction counts as no noise: else whitening would hide what is slow", "p-value", most=1.0

@@ -126,8 +126,10 @@ class WholeRuns:
         """
         rate, out = self.observed.signals[0].run.rate_hz, []
         fastest = min(tuning.fastest_swing_hz, tuning.max_swing_share * rate)
+        step = tuning.swing_range ** (1 / (tuning.swings - 1))
+        damping = (np.sqrt(step) - 1 / np.sqrt(step)) / 2  # each answers as far as the next one
         for frequency in np.geomspace(fastest / tuning.swing_range, fastest, tuning.swings):
-            for swing in _swings(float(frequency), tuning.swing_damping, rate):
+            for swing in _swings(float(frequency), float(damping), rate):
                 out.append(np.concatenate([swing.forwards(part - part[0]) for part in self.split(drive)]))
         return np.column_stack(out)
 
@@ -155,7 +157,7 @@ def flexible_features(observed: Observed, joint: int, rng: np.random.Generator, 
     position = observed.kept("position")
     velocity = observed.kept("velocity")
     acceleration = observed.kept("acceleration")
-    hats, waves = tuning.hats, tuning.waves if observed.joints <= tuning.few_joints else tuning.waves // 2
+    hats = tuning.hats
     parts: list[Part] = []
 
     def add(columns: Array, *variables: str) -> None:
@@ -166,27 +168,27 @@ def flexible_features(observed: Observed, joint: int, rng: np.random.Generator, 
         add(_hats(velocity[:, other], hats), f"velocity_{other + 1}")
         if other != joint:
             pair = f"position_{joint + 1}", f"position_{other + 1}"
-            add(_waves(position[:, [joint, other]], rng, waves), *pair)
-            add(_waves(velocity[:, [joint, other]], rng, waves), f"velocity_{joint + 1}", f"velocity_{other + 1}")
+            add(_waves(position[:, [joint, other]], rng, hats), *pair)
+            add(_waves(velocity[:, [joint, other]], rng, hats), f"velocity_{joint + 1}", f"velocity_{other + 1}")
             add(
-                _waves(np.column_stack([position[:, joint], velocity[:, other]]), rng, waves),
+                _waves(np.column_stack([position[:, joint], velocity[:, other]]), rng, hats),
                 pair[0],
                 f"velocity_{other + 1}",
             )
     others = [other for other in range(observed.joints) if other != joint]
     for first, second in islice(combinations(others, 2), tuning.max_pairs):
-        add(_waves(position[:, [first, second]], rng, waves), f"position_{first + 1}", f"position_{second + 1}")
+        add(_waves(position[:, [first, second]], rng, hats), f"position_{first + 1}", f"position_{second + 1}")
     own = f"velocity_{joint + 1}"
     add(_hats(acceleration[:, joint], hats), f"acceleration_{joint + 1}")
     placed = np.column_stack([position[:, joint], velocity[:, joint]])
     driven = np.column_stack([velocity[:, joint], acceleration[:, joint]])
-    add(_waves(placed, rng, tuning.waves), f"position_{joint + 1}", own)
-    add(_waves(driven, rng, tuning.waves), own, f"acceleration_{joint + 1}")
+    add(_waves(placed, rng, 2 * hats), f"position_{joint + 1}", own)
+    add(_waves(driven, rng, 2 * hats), own, f"acceleration_{joint + 1}")
     runs = whole_runs(observed)
     signs = _smooth_signs(runs.velocity[:, joint], tuning.sign_widths)
     turn = runs.filtered(signs[:, 2:3])
     add(runs.filtered(signs), own)
-    patches = _hats(runs.position[:, joint], tuning.fine_hats) * signs[:, 2:3]
+    patches = _hats(runs.position[:, joint], 2 * hats) * signs[:, 2:3]
     add(runs.filtered(patches), own, f"position_{joint + 1}")
     add(runs.filtered(runs.lags(signs[:, 1], tuning.memories_s)), own)
     add(runs.filtered(runs.lags(runs.velocity[:, joint], tuning.memories_s)), own)
@@ -229,20 +231,20 @@ def _banks_of_joint(
     runs, own, memories = whole_runs(observed), velocity[:, joint], tuning.memories_s
     signs = _smooth_signs(runs.velocity[:, joint], tuning.sign_widths)
     lagged = [runs.lags(values, memories) for values in (signs[:, 1], runs.velocity[:, joint])]
-    fast = [_hats(own, tuning.fine_hats), runs.filtered(np.column_stack([signs, *lagged]))]
-    patches = signs[:, 2:3] * _hats(runs.position[:, joint], tuning.fine_position_hats)
-    mapped = [runs.filtered(patches), own[:, None] * _hats(position[:, joint], tuning.position_hats)]
-    driven = _products(own, acceleration[:, joint], tuning.product_speeds)
+    fast = [_hats(own, 2 * tuning.hats), runs.filtered(np.column_stack([signs, *lagged]))]
+    patches = signs[:, 2:3] * _hats(runs.position[:, joint], 3 * tuning.hats)
+    mapped = [runs.filtered(patches), own[:, None] * _hats(position[:, joint], 2 * tuning.hats)]
+    driven = _products(own, acceleration[:, joint], tuning.hats // 2)
     out = [
         _standardise([(columns, (speed,)) for columns in fast]),
         _standardise([(columns, (place, speed)) for columns in mapped]),
-        _standardise([(_hats(position[:, joint], tuning.fine_position_hats), (place,))]),
+        _standardise([(_hats(position[:, joint], 3 * tuning.hats), (place,))]),
         _standardise([(driven, (speed, change))]),
     ]
     for other, (turned, moved) in enumerate(theirs):
         out.append(turned)
         if other != joint:
-            both = _products(position[:, joint], position[:, other], tuning.product_positions)
+            both = _products(position[:, joint], position[:, other], tuning.hats // 2)
             out += [_standardise([(both, (place, f"position_{other + 1}"))]), moved]
     return tuple(out)
 
