@@ -22,6 +22,7 @@ from armlab.diagnosis.torque.names.findings import (
     leading_causes,
     stated_findings,
     statement_of,
+    told_causes,
     with_minor_ones,
     without_lesser_unknowns,
 )
@@ -116,13 +117,18 @@ def test_a_change_below_one_percent_of_the_torque_is_minor_though_the_error_grow
     assert not Removal(0, growth=0.5, rms=0.03, torque=1.0).is_minor
 
 
-def test_of_a_joint_two_findings_are_told_of_two_causes_where_it_has_them() -> None:
-    names = ("coulomb_friction", "viscous_friction", "torque_offset")
-    found = [
-        claim(name, removal=replace(MISSED, growth=growth)) for name, growth in zip(names, (0.9, 0.6, 0.5), strict=True)
-    ]
-    told = with_minor_ones(found, [part("friction", (0, 1), 0.6), part("torque_offset", (2,), 0.3)])
-    assert [each.effect for each in told if not each.minor] == ["coulomb_friction", "torque_offset"]
+def test_of_a_joint_the_two_findings_that_explain_most_are_told_whatever_their_cause() -> None:
+    found = [claim(name) for name in ("coulomb_friction", "viscous_friction", "torque_ripple")]
+    told = with_minor_ones(found, [part("friction", (0, 1), 0.6), part("torque_ripple", (2,), 0.01)])
+    assert [each.effect for each in told if not each.minor] == ["coulomb_friction", "viscous_friction"]
+    told = with_minor_ones(found, [part("friction", (0, 1), 0.4), part("torque_ripple", (2,), 0.5)])
+    assert [each.effect for each in told if not each.minor] == ["coulomb_friction", "torque_ripple"]
+
+
+def test_a_told_cause_has_the_share_and_the_joints_of_what_is_told_of_it() -> None:
+    found = [claim("coulomb_friction"), replace(claim("coulomb_friction", 2), minor=True)]
+    (cause,) = told_causes([part("friction", (0,), 0.6), part("friction", (1,), 0.3, joint=2)], found)
+    assert (cause.share, cause.joints, cause.findings) == (0.6, (1,), (0,))
 
 
 def test_at_most_four_causes_are_told() -> None:

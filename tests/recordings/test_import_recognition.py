@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from recording_folders import POSITION, TORQUE, folder_with, frame
 from refusals import refusal
 
-from armlab.recordings.imports.families import list_columns
+from armlab.recordings.imports.families import describe_unused, list_columns
 from armlab.recordings.imports.files import import_files
 from armlab.recordings.imports.plan import plan_import
 from armlab.recordings.imports.text import read_odd_csv
@@ -222,6 +222,11 @@ def test_a_pattern_of_too_many_columns_is_an_error(tmp_path: Path) -> None:
     message = refusal(import_files, [path], tmp_path / "new", options)
     assert "--torque tau_J* names 6 columns (tau_J[0], tau_J[1], " in message
     assert read_odd_csv(path).table.names[1] == "tau_J[0]"
+
+
+def test_a_velocity_is_proposed_by_what_its_columns_begin_and_end_with() -> None:
+    names = [f"/joint_states/joint_{number}/velocity" for number in (1, 2, 3)]
+    assert "--velocity '/joint_states/joint_*/velocity'" in describe_unused(names, ("joint_1", "joint_2", "joint_3"))
 
 
 def test_everything_that_is_missing_is_asked_for_at_once(tmp_path: Path) -> None:

@@ -45,6 +45,15 @@ def test_a_joint_that_stands_still_is_named() -> None:
     assert said(run_of(table)) == [("still_joint", 3)]
 
 
+def test_the_velocity_of_a_joint_that_rests_is_no_suspicion() -> None:
+    table, rng = with_velocity(), np.random.default_rng(0)
+    table["q3"] = 0.25 + 1e-6 * rng.standard_normal(len(table))
+    table["v3"] = 1e-5 * rng.standard_normal(len(table))
+    assert said(run_of(table)) == []
+    table["v3"] = table["v2"]  # the channel of another joint
+    assert said(run_of(table)) == [("velocity_mismatch", 3)]
+
+
 def test_a_torque_that_freezes_while_the_joint_moves_is_named() -> None:
     table = frame()
     table.loc[400:600, "tau1"] = table["tau1"][400]

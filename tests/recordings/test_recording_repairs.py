@@ -363,6 +363,16 @@ def test_a_wrapped_encoder_is_unwrapped(tmp_path: Path) -> None:
     assert kinds(run) == [("wrapped_encoder", "repaired")]
 
 
+def test_a_channel_that_counts_whole_turns_is_left_alone(tmp_path: Path) -> None:
+    table = frame()
+    ticks = np.round(table["q2"] * 4096 / (2 * np.pi))
+    table["q2"] = 2 * np.pi * ticks
+    settings = {"transmission": {"position": [[1, 0, 0], [0, 1 / 4096, 0], [0, 0, 1]]}}
+    run = load_recording(folder_with(tmp_path, table, settings)).runs[0]
+    assert_allclose(run.position[:, 1], 2 * np.pi * ticks / 4096, atol=1e-12)
+    assert kinds(run) == []
+
+
 def test_a_jump_that_is_no_whole_turn_is_left_alone(tmp_path: Path) -> None:
     table = frame()
     table.loc[800:, "q2"] += 5.0
