@@ -39,6 +39,7 @@ from problem.impossible_bodies import find_impossible_bodies
 from problem.joint_words import joint_in_words, joints_in_words
 from problem.simulator_check import check_with_mujoco, left_out_of_urdf
 
+FACTOR_OF_UNITS = 3.0  # times a limit: less beyond it is a peak, or a limit of long use
 RESTING_SHARE = 1e-3  # of the speed of the fastest joint of a run: a joint that is slower rests
 MIN_FROZEN_TIME_S = 0.25  # a torque that repeats to the last digit for so long while its joint moves
 
@@ -129,11 +130,13 @@ def _find_limit_violations(run: MotionRun, arm: Arm, joint: int) -> list[Finding
         found += _joint_warning("beyond_limits", joint, text)
     fastest = float(np.abs(block_means(np.gradient(run.position[:, [joint]], run.time, axis=0))).max())
     if fastest > LIMIT_TOLERANCE_FACTOR * limits.velocity:
-        text = f"{own} moves at {fastest:.4g}, its limit is {limits.velocity:.4g}: another unit or clock?"
+        doubt = ": another unit or clock?" if fastest > FACTOR_OF_UNITS * limits.velocity else ""
+        text = f"{own} moves at {fastest:.4g}, its limit is {limits.velocity:.4g}{doubt}"
         found += _joint_warning("beyond_limits", joint, text)
     peak = float(np.abs(run.torque[:, joint]).max()) if isinstance(run, Run) else 0.0
     if peak > LIMIT_TOLERANCE_FACTOR * limits.torque:
-        text = f"torque of {own} reaches {peak:.4g}, its limit is {limits.torque:.4g}: another unit?"
+        doubt = ": another unit?" if peak > FACTOR_OF_UNITS * limits.torque else ""
+        text = f"torque of {own} reaches {peak:.4g}, its limit is {limits.torque:.4g}{doubt}"
         found += _joint_warning("beyond_limits", joint, text)
     return found
 

@@ -122,7 +122,9 @@ class _Parts:
         for number, claim in enumerate(self.claims):
             if is_in_no_model(claim):
                 out[number] = replace(claim, removal=self._removal_by_test(claim))
-            if claim.in_links and widths is not None:
+            if claim.in_links and claim.candidate is None:  # these data do not tell which link is off
+                out[number] = replace(claim, removal=self._removal_of_links())
+            elif claim.in_links and widths is not None:
                 less = tuple(0.0 if claim.joint == link else width for link, width in enumerate(widths, 1))
                 without, last = State(self.model.state.groups, less), claim.joint or self.model.columns.joints
                 out[number] = replace(claim, removal=self.removal(self.model.state, without, range(last)))
