@@ -326,8 +326,8 @@ def uses(diagnosis: Diagnosis) -> list[str]:
     if any(_motion_may_tell(claim) for claim in diagnosis.claims):
         asked.append("`armlab next verdict.json --robot ROBOT` designs a motion that decides between rivals.")
     held = (
-        "the links and every named effect, fitted beside what else helps to predict, so that its numbers may differ from "
-        "those of the findings"
+        "the links and every named effect, fitted beside what else helps to predict (its numbers may differ from those "
+        "of the findings)"
     )
     if diagnosis.is_plain:
         held = "plain least squares, which predicts blocks of these runs better than a model with the named effects"
