@@ -9,7 +9,7 @@ from itertools import combinations
 from pathlib import Path
 from tempfile import mkdtemp
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -47,6 +47,7 @@ from armlab.report.changes.comparison_report import (
     comparison_lines,
     comparison_sentences,
     deciding_steps,
+    detectable_sentence,
     make_comparison_file,
 )
 from problem.regressor import rigid_body_torque
@@ -112,6 +113,22 @@ def test_two_recordings_of_an_unchanged_robot_are_the_same() -> None:
     first, second = comparison_sentences(found)
     assert first == "Nothing changed between cold and again that the recordings show."
     assert "Smaller changes than these would not have been seen" in second
+
+
+@pytest.mark.parametrize(("detectable", "text"), [(0.5, "25 %"), (2.0, "100 %"), (6.0, "4-fold")])
+def test_a_level_that_would_have_to_change_by_more_than_itself_is_told_as_a_multiple(
+    detectable: float, text: str
+) -> None:
+    change = SimpleNamespace(
+        effect="coulomb_friction",
+        parameter="level",
+        changed=False,
+        detectable=detectable,
+        levels=(2.0, 2.0),
+        unit="N.m",
+    )
+    sentence = detectable_sentence(cast(Comparison, SimpleNamespace(changes=(change,))))
+    assert sentence.endswith(f"Coulomb friction {text}.")
 
 
 def test_levels_in_common_are_those_of_the_robot() -> None:

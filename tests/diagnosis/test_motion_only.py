@@ -39,7 +39,7 @@ from armlab.recordings.motion import load_motion_recording
 from armlab.recordings.recording import MotionRun
 from armlab.report.motion.motion_page import joint_table, motion_page, untold_table
 from armlab.report.motion.motion_verdict import make_motion_verdict, motion_texts
-from armlab.report.motion.motion_words import error_phrase, motion_lines
+from armlab.report.motion.motion_words import error_phrase, motion_lines, remarks
 from armlab.report.verdict import verdict_of
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
@@ -90,6 +90,14 @@ def test_a_finding_is_told_in_the_units_of_a_reader(diagnosis: MotionDiagnosis) 
     told = [line for line in lines if line.startswith("  ") and ("Coulomb" in line or "delay" in line)]
     assert told
     assert not any("_" in line for line in told)
+
+
+def test_positions_beyond_their_limits_are_told(diagnosis: MotionDiagnosis) -> None:
+    run = diagnosis.recording.runs[0]
+    far = run.with_signals(run.time, {"position": run.position + 100.0})
+    moved = replace(diagnosis, recording=replace(diagnosis.recording, runs=(far,)))
+    assert not any("Warning" in each for each in remarks(diagnosis))
+    assert any(each.startswith("Warning: position of") for each in remarks(moved))
 
 
 def test_what_the_motion_does_not_tell_is_told(diagnosis: MotionDiagnosis) -> None:

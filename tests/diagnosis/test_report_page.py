@@ -27,7 +27,7 @@ from armlab.common.report.charts import (
     REFITTED_LOOK,
 )
 from armlab.common.report.page import keep_units
-from armlab.diagnosis.result import Diagnosis, Member, Part, Rival, Unexplained
+from armlab.diagnosis.result import Diagnosis, Member, Part, Removal, Rival, Unexplained
 from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.effects.contract import Effect
 from armlab.effects.friction import CoulombFriction
@@ -37,7 +37,7 @@ from armlab.recordings.load import load_recording
 from armlab.report.account.account import account_of
 from armlab.report.account.next_steps import next_steps
 from armlab.report.torque import write
-from armlab.report.torque.content import error_note, finding_details, left_table
+from armlab.report.torque.content import cause_table, error_note, finding_details, left_table, uses
 from armlab.report.torque.gallery import draw_gallery
 from armlab.report.torque.measured import body_sentences, joint_table
 from armlab.report.torque.residuals import correlation_seconds, filter_correlation_seconds, select_residuals
@@ -350,6 +350,25 @@ def test_a_payload_is_told_by_mass_and_centre_in_the_frame_of_its_joint(found: D
     (sentence,) = body_sentences(replace(found, claims=(claim,), parts=()))
     load = "2.00 kg (1.998 to 2.003) at (0, 20, 60) mm from j0"
     assert sentence.startswith(f"The arm carries a load that the simulation does not have: {load}")
+
+
+def test_a_cause_without_numbers_is_worth_the_error_without_it(found: Diagnosis) -> None:
+    removal = Removal(0, growth=0.5, rms=2.0, torque=10.0)
+    claim = replace(found.claims[0], effect="inertial_parameter_error", parameters=(), candidate=None, removal=removal)
+    parts = (Part("links", None, (), (), (0,), removal, 0.9, (0.9,)),)
+    table = cause_table(replace(found, claims=(claim,), parts=parts))
+    assert table is not None
+    assert str(table.rows[0][2]).endswith(": 3 N m without, 2 N m with it")
+
+
+def test_an_export_is_recommended_only_where_a_simulator_takes_the_links(
+    found: Diagnosis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_: object) -> None:
+        raise InputError("link 1 is no body")
+
+    monkeypatch.setattr("armlab.report.torque.content.build_simulator_model", refuse)
+    assert "--method physical" in uses(found)[-1]
 
 
 def test_words_of_the_field_lead_to_their_meaning_once(texts: dict[str, str]) -> None:
