@@ -25,7 +25,7 @@ from armlab.diagnosis.torque.names.claims import Names, links_claim, make_claims
 from armlab.diagnosis.torque.names.decide import lost_names, named_claims, naming_of
 from armlab.diagnosis.torque.names.findings import stated_findings, with_minor_ones, without_lesser_unknowns
 from armlab.diagnosis.torque.names.weighing import weigh_effect, weigh_link, weigh_structure
-from armlab.diagnosis.torque.predict.fits import joint_fits
+from armlab.diagnosis.torque.predict.fits import identified_model, joint_fits
 from armlab.diagnosis.torque.predict.found_model import build_model
 from armlab.diagnosis.torque.predict.joint_friction import joint_friction
 from armlab.diagnosis.torque.predict.parts import (
@@ -169,13 +169,15 @@ def _assemble(
     alone = build_model(recording, simulation, prediction.with_names_alone(named), named, {})
     alone = with_smoothing_of(found, alone)
     final = filtered_residual(found, observed)
-    refit = model.residual(model.solver.fit(State((), None)))
+    rigid = identified_model(found, plain, observed, is_rigid=True)
+    beside = simulation.kind == "simulated"  # links alone are what that torque lacks
+    refit = model.residual(model.solver.fit(State((), None))) if beside else filtered_residual(rigid, observed)
     start = refit if simulation.kind == "refit" else design.target
     noise = final.copy()
     for each in unknowns:
         noise[:, each.joint] -= each.prediction
     floor = noise_floor(noise, design.features, observed, tuning)
-    fits = joint_fits(refit, (found, alone), plain, floor, observed, tuning)
+    fits = joint_fits(refit, (rigid, found, alone), plain, floor, observed, tuning)
     parts = explain_error(prediction.model, observed, claims, (start, final), floor)
     claims = without_lesser_unknowns(claims, parts)
     parts = explain_error(prediction.model, observed, claims, (start, final), floor)

@@ -111,8 +111,9 @@ def left_by_joint(diagnosis: Diagnosis) -> tuple[Left, ...]:
         rows = observed.rows_held_out(fit.joint - 1)
         torque = float(np.sqrt(np.mean(observed.torque[rows, fit.joint - 1] ** 2)))
         share = fit.after / max(torque, 1e-300)
-        noise = min(fit.noise_floor, fit.after)
-        out.append(Left(fit.joint, share, fit.after, noise, known.get(fit.joint, ()), share <= MAX_USUAL_SHARE))
+        out.append(
+            Left(fit.joint, share, fit.after, fit.noise_floor, known.get(fit.joint, ()), share <= MAX_USUAL_SHARE)
+        )
     return tuple(out)
 
 
