@@ -35,8 +35,10 @@ def joint_fits(
     observed: Observed,
     tuning: Tuning,
 ) -> tuple[JointFit, ...]:
-    """The fits of all joints. refit: residual (rows, joints) of the refitted rigid arm; models: of rigid links alone, the
-    one that is found, and that of the named effects alone; floor: (joints,), N m (N).
+    """The fits of all joints.
+
+    refit: residual (rows, joints) of the refitted rigid arm. models: of rigid links alone, the one that is found, and
+    that of the named effects alone. floor: (joints,), N m (N), at most.
     """
     rigid, found, alone = models
     every = (found, alone, identified_model(found, plain, observed))
