@@ -399,15 +399,13 @@ class LinkLaw:
 
 
 def link_law(arm: Arm, link: int, mean: Array, spread: Array, added: bool) -> LinkLaw | None:
-    """The first name for what a link (from 1) has more than its simulation; None where what is left is no body.
+    """The first name for what a link (from 1) has more than its simulation; None where a negative mass would be left.
 
     A payload where it can be a body, the link is the last one, and `added` says that no other link is off as far;
     else an error of the link. mean (10,), spread (10, 10): of its ten parameters.
     """
-    if arm.links is not None:
-        stated = arm.parameters[10 * link - 10 : 10 * link]
-        if _may_be_body(stated, np.zeros((10, 10))) and not _may_be_body(stated + mean, spread):
-            return None
+    if arm.links is not None and arm.links[link - 1].mass + mean[0] < 0:
+        return None
     body = _may_be_body(mean, spread)
     names = (PAYLOAD_FACTS.id, INERTIAL_ERROR_FACTS.id)
     if body and added and link == len(arm):
