@@ -104,7 +104,7 @@ def _add_load_options(command: Callable[..., None]) -> Callable[..., None]:
     "--centre",
     type=FiniteNumber(min=-100, max=100),
     nargs=3,
-    help="Known place of the load in the link's frame, m.",
+    help="Known place of the load in the link's frame, m; it is a point there, without inertia of its own.",
 )
 @_add_load_options
 @prints_result

@@ -15,6 +15,7 @@ from armlab.common.report.page import Table, png_address, render_page
 from armlab.common.report.palette import figure_style
 from armlab.common.report.wording import format_number, format_unit
 from armlab.effects.contract import Candidate
+from armlab.effects.library import effect_named
 from armlab.identification.identifier import USUAL_METHOD, Identifier
 from armlab.identification.identifier_choice import choose_identifier
 from armlab.identification.model import Model
@@ -64,7 +65,7 @@ def identification_page(recording: Recording, identifier: Identifier, errors: tu
         totals=[total_error_line(each) for each in errors],
         parameters=_parameters(model),
         untold=untold_names(model),
-        warnings=list(overfit_warnings(errors)),
+        warnings=[*overfit_warnings(errors), *impossible_warnings(model)],
         pictures=pictures,
     )
 
@@ -95,6 +96,18 @@ def overfit_warnings(errors: tuple[RunError, ...]) -> Iterator[str]:
                 f"warning: joint {joint} leaves {percent:.0f} % of its torque held out and {known:.0f} % of what was "
                 "fitted: the model does not carry over; record longer motion, or fit fewer numbers (--tolerance)"
             )
+
+
+def impossible_warnings(model: Model) -> Iterator[str]:
+    """A line for each number of a joint whose whole interval is below zero, where no joint has one."""
+    for index, part in enumerate(model.structure.components):
+        positive = {each.name for each in effect_named(part.effect).parameters if each.positive}
+        for each in model.component_parameters(index):
+            if each.name in positive and isinstance(each.interval, tuple) and np.max(each.interval) < 0:
+                yield (
+                    f"warning: {part.label}: {parameter_line(each)}, and none is below zero: the data do not tell it "
+                    "from the links; take --method physical, or record faster motion"
+                )
 
 
 def _percent_by_joint(errors: tuple[RunError, ...], role: Role) -> dict[int, float]:
@@ -217,6 +230,7 @@ def identify_recording(
     if not recording.with_role("validate"):
         yield NO_VALIDATION_WARNING
     yield from overfit_warnings(errors)
+    yield from impossible_warnings(model)
     progress("drawing the page")
     page = identification_page(recording, identifier, errors)
     file, report = write_texts({"model.yaml": model_text(model, out), "report.html": page}, out)

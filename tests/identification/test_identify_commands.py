@@ -2,6 +2,8 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pandas as pd
@@ -19,7 +21,7 @@ from armlab.effects.parameters import ParameterValue
 from armlab.identification.estimators.least_squares import EXCITED_TOLERANCE, WeightedLeastSquares
 from armlab.identification.identifier import METHODS, Identifier
 from armlab.identification.identifier_choice import choose_identifier
-from armlab.identification.identify import overfit_warnings
+from armlab.identification.identify import impossible_warnings, overfit_warnings
 from armlab.identification.model import Model
 from armlab.identification.priors import NO_PULL
 from armlab.identification.regression import Regression
@@ -145,6 +147,14 @@ def test_a_joint_that_leaves_twice_as_much_held_out_is_warned_of() -> None:
 
     (line,) = overfit_warnings((error("identify", 15.0, 10.0), error("validate", 64.0, 19.0)))
     assert line.startswith("warning: joint 1 leaves 64 % of its torque held out and 15 % of what was fitted")
+
+
+@pytest.mark.parametrize(("interval", "warned"), [((-0.1, -0.03), True), ((-0.1, 0.01), False)])
+def test_a_rotor_inertia_below_zero_for_certain_is_warned_of(interval: tuple[float, float], warned: bool) -> None:
+    number = ParameterValue("inertia", -0.07, interval, "kg.m2")
+    part = SimpleNamespace(effect="rotor_inertia", label="rotor_inertia, joint 4")
+    model = SimpleNamespace(structure=SimpleNamespace(components=(part,)), component_parameters=lambda _: (number,))
+    assert any("none is below zero" in each for each in impossible_warnings(cast(Model, model))) == warned
 
 
 def test_directions_that_the_motion_hardly_excites_stay_zero_and_keep_the_interval_of_a_fit() -> None:
