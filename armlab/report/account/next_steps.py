@@ -44,7 +44,8 @@ def _steps(text: str, own: Sequence[StatedFinding], diagnosis: Diagnosis, accoun
     elif text:
         is_link = effect_named(own[0].claim.effect).where == "link"
         place = "" if not joints else links_in_words(arm, joints) if is_link else joints_in_words(arm, joints)
-        variables = own[0].claim.depends_on if own[0].claim.effect == UNKNOWN.id else ()
+        depends = {each.claim.depends_on for each in own if each.claim.effect == UNKNOWN.id}
+        variables = depends.pop() if len(depends) == 1 else ()
         of = f"{place}{f', by {variables_in_words(arm, variables)}' if variables else ''}"
         own_place = "the link" if is_link else "the joint"
         if len(joints) == 1 and not variables and own_place in text:

@@ -384,10 +384,11 @@ def _card(arm: Arm, named: NamedChange, names: Sequence[str]) -> ChangeCard:
     rows = [[one.name, one.value, one.interval, one.unit] for each in named.parameters for one in parameter_rows(each)]
     factors = [f"{format_number(1 + gain)} times in {name}" for name, gain in zip(names, named.gains, strict=True)]
     rivals = [rival_in_words(arm, each) for each in named.not_told]
+    alone = "Nothing else" if len(named.told) == 1 else "Nothing but these"
     texts = (
         f"{named.equation}. Log evidence {named.evidence:.0f}, p-value {format_probability(named.p_value)}.",
         f"Without this change the squared held-out error is larger: {join_words(factors)}.",
-        f"It could also be {join_words(rivals)}." if rivals else "Nothing else explains it nearly as well.",
+        f"It could also be {join_words(rivals)}." if rivals else f"{alone} explains it nearly as well.",
     )
     numbers = Table(["change of", "value", "95 % interval", "unit"], rows, (0, 3), stacked=True)
     title = _names_phrase(arm, named)
