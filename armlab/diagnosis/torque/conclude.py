@@ -170,8 +170,9 @@ def _assemble(
     alone = with_smoothing_of(found, alone)
     final = filtered_residual(found, observed)
     rigid = identified_model(found, plain, observed, is_rigid=True)
-    beside = simulation.kind == "simulated"  # links alone are what that torque lacks
-    refit = model.residual(model.solver.fit(State((), None))) if beside else filtered_residual(rigid, observed)
+    refit = filtered_residual(rigid, observed)
+    if simulation.kind == "simulated" or (simulation.model is not None and simulation.model.effects):
+        refit = model.residual(model.solver.fit(State((), None)))  # links beside what else the simulation has
     start = refit if simulation.kind == "refit" else design.target
     noise = final.copy()
     for each in unknowns:
