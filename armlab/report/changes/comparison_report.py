@@ -101,7 +101,19 @@ def _leading_phrase(comparison: Comparison, named: NamedChange) -> str:
         return f"{where} ({whole})"
     if not named.changes:
         return f"{where}: {named.equation}"
-    return f"{where} ({_amount(max(named.changes, key=_sureness), short=True)})"
+    return f"{where} ({_amount(_surest_first(comparison, named)[0], short=True)})"
+
+
+def _surest_first(comparison: Comparison, named: NamedChange) -> list[Change]:
+    """Its numbers, with the friction of the joint as a whole where the law of another cause holds it.
+
+    Numbers that change by one factor are alike sure, and stay in the order of the law.
+    """
+    if named.form == ONE_FACTOR:
+        return list(named.changes)
+    own = (each for each in comparison.changes if each.parameter == ALL_FRICTION and each.effect == named.effect)
+    whole = [each for each in own if each.joint == named.joint and effect_named(named.effect).cause != FRICTION]
+    return sorted((*named.changes, *whole), key=_sureness, reverse=True)
 
 
 def _all_friction(comparison: Comparison, named: NamedChange) -> str | None:
@@ -121,7 +133,7 @@ def change_phrase(comparison: Comparison, named: NamedChange) -> str:
 
 def _amounts(comparison: Comparison, named: NamedChange) -> list[str]:
     whole = _all_friction(comparison, named)
-    return [*([] if whole is None else [whole]), *map(_amount, sorted(named.changes, key=_sureness, reverse=True))]
+    return [*([] if whole is None else [whole]), *map(_amount, _surest_first(comparison, named))]
 
 
 def _sureness(change: Change) -> float:
