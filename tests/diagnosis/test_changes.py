@@ -44,6 +44,7 @@ from armlab.recordings.public import fetch_recording
 from armlab.recordings.recording import Recording
 from armlab.report.changes.comparison_report import (
     _amount,
+    _surest_first,
     comparison_lines,
     comparison_sentences,
     deciding_steps,
@@ -113,6 +114,23 @@ def test_two_recordings_of_an_unchanged_robot_are_the_same() -> None:
     first, second = comparison_sentences(found)
     assert first == "Nothing changed between cold and again that the recordings show."
     assert "Smaller changes than these would not have been seen" in second
+
+
+def test_of_a_change_of_play_the_surest_number_leads_and_all_friction_is_one() -> None:
+    def row(parameter: str, difference: float) -> SimpleNamespace:
+        return SimpleNamespace(
+            effect="backlash",
+            joint=1,
+            parameter=parameter,
+            difference=difference,
+            interval=(difference - 1, difference + 1),
+        )
+
+    gap, way, whole = row("gap", 0.1), row("way", 3.0), row(ALL_FRICTION, 5.0)
+    named = SimpleNamespace(effect="backlash", joint=1, form=None, changes=(gap, way))
+    comparison = SimpleNamespace(changes=(gap, way, whole))
+    ordered = _surest_first(cast(Comparison, comparison), cast(Any, named))
+    assert [each.parameter for each in ordered] == [ALL_FRICTION, "way", "gap"]
 
 
 @pytest.mark.parametrize(("detectable", "text"), [(0.5, "25 %"), (2.0, "100 %"), (6.0, "4-fold")])
