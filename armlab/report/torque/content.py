@@ -136,13 +136,13 @@ def _cause_size(diagnosis: Diagnosis, cause: StatedCause) -> str:
 
 def _size_by_removal(diagnosis: Diagnosis, own: Sequence[StatedFinding]) -> str:
     """What a cause without numbers is worth at the joint that misses it most."""
-    removals = [each.claim.removal for each in own if each.claim.removal is not None]
-    if not removals:
+    missed = [(each.claim.removal, each.claim) for each in own if each.claim.removal is not None]
+    if not missed:
         return ""
-    most, arm = max(removals, key=lambda each: each.growth), diagnosis.simulation.arm
-    without, joint = most.rms * (1 + most.growth), joint_in_words(arm, most.joint + 1)
-    unit = joint_unit(arm, most.joint)
-    return f"error of {joint}: {format_number(without)} {unit} without, {format_number(most.rms)} {unit} with it"
+    (removal, claim), arm = max(missed, key=lambda each: each[0].growth), diagnosis.simulation.arm
+    unit = joint_unit(arm, removal.joint)
+    without, with_it = (f"{format_number(each)} {unit}" for each in finding_errors(claim))
+    return f"error of {joint_in_words(arm, removal.joint + 1)}: {without} without, {with_it} with it"
 
 
 def _how_sure(own: Sequence[StatedFinding]) -> str:
