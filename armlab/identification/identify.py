@@ -105,8 +105,8 @@ def impossible_warnings(model: Model) -> Iterator[str]:
         for each in model.component_parameters(index):
             if each.name in positive and isinstance(each.interval, tuple) and np.max(each.interval) < 0:
                 yield (
-                    f"warning: {part.label}: {parameter_line(each)}, and none is below zero: the data do not tell it "
-                    "from the links; take --method physical, or record faster motion"
+                    f"warning: {part.label}: {parameter_line(each)}, which cannot be below zero: the data do not tell "
+                    "it from the links; take --method physical, or record faster motion"
                 )
 
 

@@ -46,7 +46,7 @@ def _unwrap_channel(run: AnyRun, name: str, channel: int) -> AnyRun:
 def _wraps(signal: Array, period: float) -> Array | None:
     """Periods by which a signal jumps between two samples, (samples - 1,); None where it does not or moves as fast.
 
-    A signal of whole periods alone counts them: it moves by nothing else.
+    A signal that moves by whole periods alone counts turns and does not wrap.
     """
     steps = np.diff(signal)
     turns = np.rint(steps / period)

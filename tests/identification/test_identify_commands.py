@@ -154,7 +154,7 @@ def test_a_rotor_inertia_below_zero_for_certain_is_warned_of(interval: tuple[flo
     number = ParameterValue("inertia", -0.07, interval, "kg.m2")
     part = SimpleNamespace(effect="rotor_inertia", label="rotor_inertia, joint 4")
     model = SimpleNamespace(structure=SimpleNamespace(components=(part,)), component_parameters=lambda _: (number,))
-    assert any("none is below zero" in each for each in impossible_warnings(cast(Model, model))) == warned
+    assert any("cannot be below zero" in each for each in impossible_warnings(cast(Model, model))) == warned
 
 
 def test_directions_that_the_motion_hardly_excites_stay_zero_and_keep_the_interval_of_a_fit() -> None:

@@ -109,10 +109,10 @@ def describe_unused(names: Sequence[str], joints: Sequence[str]) -> str:
 def _pattern_of(family: Sequence[str], names: Sequence[str]) -> str:
     """`'Velocity*'` where it names these columns of all and no others, else their names.
 
-    What the names end in alike stands in it: columns that are used already may begin alike.
+    The pattern has the common start and the common end: columns that are in use may start alike.
     """
     first = commonprefix(family)  # noqa: RUF071 - of names, not of paths
-    last = commonprefix([name[len(first) :][::-1] for name in family])[::-1]  # noqa: RUF071
+    last = commonprefix([name[len(first) :][::-1] for name in family])[::-1]  # noqa: RUF071 - of names too
     pattern = f"{first}*{last}"
     found = [name for name in names if fnmatchcase(name, pattern)]
     return f"'{pattern}'" if len(family) > 1 and found == list(family) else ",".join(family)

@@ -56,9 +56,9 @@ class StatedFinding:
 
 @dataclass(frozen=True, eq=False)
 class Account:
-    """causes: the largest first. told: by the parts alone about which a finding is told; leading: those of them that
-    the summary tells. findings: not minor, the largest share first; minor: the others. friction: of each joint with
-    friction among the findings. left: of each joint.
+    """causes: the largest first. told: causes counted by those parts of which a finding is told; leading: those of them
+    that the summary tells. findings: not minor, the largest share first; minor: the others. friction: of each joint
+    with friction among the findings. left: of each joint.
     """
 
     causes: tuple[StatedCause, ...] = ()

@@ -350,8 +350,8 @@ def _export_text(diagnosis: Diagnosis) -> str:
         return "A simulator needs masses of links: give the robot file nominal `links`, and diagnose again."
     if diagnosis.model is not None and not _is_exportable(diagnosis.model):
         return (
-            "A simulator takes links that can be bodies, and these are fitted freely: `armlab identify RECORDING "
-            "--method physical` fits such links."
+            "A simulator needs links that are possible bodies. The links of this model are not: `armlab identify "
+            "RECORDING --method physical` fits possible ones."
         )
     missing = dict.fromkeys(claim.effect for claim in diagnosis.claims if not _has_place_in_simulator(claim))
     lost = f" That has no place for {join_words([effect_in_words(each) for each in missing])}." if missing else ""

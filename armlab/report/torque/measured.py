@@ -91,7 +91,7 @@ def _left_cell(account: Account, joint: int, arm: Arm) -> str:
 
 
 def joints_without_finding(diagnosis: Diagnosis) -> str:
-    """`Nothing of practical size was found at joints 1, 2 and 5.`; not of a joint that a finding elsewhere mends."""
+    """`Nothing of practical size was found at joints 1, 2 and 5.`: joints that no finding names and none mends."""
     guilty = {each.claim.joint for each in account_of(diagnosis).findings if each.claim.effect != PAYLOAD_FACTS.id}
     arm, start = diagnosis.simulation.arm, errors_at_start(diagnosis)
     guilty |= {each.joint for each in diagnosis.fit if start[each.joint - 1] > (1 + MAX_MINOR_GROWTH) * each.after}

@@ -101,7 +101,7 @@ def causes_of(parts: Sequence[Part]) -> tuple[StatedCause, ...]:
 
 
 def told_causes(parts: Sequence[Part], claims: Sequence[Claim]) -> tuple[StatedCause, ...]:
-    """The causes by the parts alone about which a finding is told."""
+    """The causes, counted by those parts of the model of which a finding is told."""
     return causes_of([each for each in parts if not all(claims[number].minor for number in each.claims)])
 
 
