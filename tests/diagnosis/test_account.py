@@ -168,11 +168,14 @@ def model() -> FittedModel:
 
 
 def test_all_causes_come_before_the_places_of_any() -> None:
-    first = "50 % of the error comes from friction at joints 1, 2, 3, 4, 5 and 6"
-    short, longer = "20 % from torque offset", "20 % from torque offset at joints 1, 2 and 3"
-    assert list_while_short(first, [(short, longer)]) == f"{first}, {longer}"
-    both = [("25 % from backlash", "25 % from backlash at joint 2"), (short, longer)]
-    assert list_while_short(first, both) == f"{first}, 25 % from backlash at joint 2, {short}"
+    friction = "50 % of the error comes from friction"
+    first = (friction, f"{friction} at joints 1, 2, 3, 4, 5 and 6")
+    offset = ("20 % from torque offset", "20 % from torque offset at joints 1, 2 and 3")
+    backlash = ("25 % from backlash", "25 % from backlash at joint 2")
+    assert list_while_short([first, offset]) == f"{first[1]}, {offset[1]}"
+    assert list_while_short([first, backlash, offset]) == f"{first[1]}, {backlash[1]}, {offset[0]}"
+    more = [first, backlash, offset, ("3 % from cable stiffness of the robot",) * 2]
+    assert list_while_short(more).startswith(f"{first[0]}, {backlash[1]}, {offset[0]}, 3 % from")
 
 
 def test_shares_of_findings_sum_to_that_of_their_cause() -> None:

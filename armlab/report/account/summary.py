@@ -111,16 +111,15 @@ class _Writer:
         share = min(round(100 * first.share), most)
         is_alone = len(self.account.causes) > 1 and not others and share == 100
         amount = "More than 99" if is_alone else "Less than 1" if share < 1 else str(share)
-        shares = [f"{100 * each.share:.0f} % from" for each in others]
-        names = [cause_name(each, self.account.findings_of(each)) for each in others]
+        starts = [f"{amount} % of the error comes from", *(f"{100 * each.share:.0f} % from" for each in others)]
         forms = [
-            (f"{of} {name}", f"{of} {self.cause_in_words(each)}")
-            for of, name, each in zip(shares, names, others, strict=True)
+            (f"{start} {cause_name(each, self.account.findings_of(each))}", f"{start} {self.cause_in_words(each)}")
+            for start, each in zip(starts, self.account.leading, strict=True)
         ]
         unexplained = open_share(self.account)
         if unexplained > 1 - STATED_SHARE:
             forms.append((f"{100 * unexplained:.0f} % stays unexplained",) * 2)
-        return f"{list_while_short(f'{amount} % of the error comes from {self.cause_in_words(first)}', forms)}."
+        return f"{list_while_short(forms)}."
 
     def cause_in_words(self, cause: StatedCause) -> str:
         """The cause with its place: by its name where its findings have one."""
@@ -188,21 +187,21 @@ class _Writer:
         return best, float(start[best.joint - 1])
 
 
-def list_while_short(first: str, others: Sequence[tuple[str, str]]) -> str:
+def list_while_short(forms: Sequence[tuple[str, str]]) -> str:
     """As many parts as MAX_FIRST_WORDS allow, then as many of them as these allow in their longer form.
 
-    others: a short and a longer form of each.
+    forms: a short and a longer form of each part; the first part stands there at any length.
     """
 
     def is_short(parts: Sequence[str]) -> bool:
         return len(" ".join(parts).split()) <= MAX_FIRST_WORDS
 
-    parts = [first, *(short for short, _ in others)]
+    parts = [short for short, _ in forms]
     while len(parts) > 1 and not is_short(parts):
         parts.pop()
-    for number, (_, longer) in enumerate(others[: len(parts) - 1], 1):
+    for number, (_, longer) in enumerate(forms[: len(parts)]):
         tried = [*parts[:number], longer, *parts[number + 1 :]]
-        parts = tried if is_short(tried) else parts
+        parts = tried if is_short(tried) or len(parts) == 1 else parts
     return ", ".join(parts)
 
 
@@ -304,8 +303,8 @@ def _name_of(own: Sequence[StatedFinding]) -> str:
     if first.kind == "class":
         return join_words([effect_named(each).words for each in first.effects], "or")
     name = effect_named(first.effects[0]).words
-    behind = f" with {FRICTION}" if own[0].is_friction else ""
-    return f"{name}{behind}{' (not certain)' if first.kind == 'cause' else ''}"
+    behind = f"{FRICTION} behind " if own[0].is_friction else ""
+    return f"{behind}{name}{' (not certain)' if first.kind == 'cause' else ''}"
 
 
 def _describe_unnamed(joint: JointFit, model: TorqueModel) -> tuple[str, str]:
