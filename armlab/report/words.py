@@ -14,7 +14,7 @@ from armlab.diagnosis.torque.names.findings import Statement
 from armlab.diagnosis.torque.rows.simulation import Simulation
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
-from armlab.effects.links import PAYLOAD_FACTS
+from armlab.effects.links import INERTIAL_ERROR_FACTS, PAYLOAD_FACTS
 from armlab.effects.parameters import ParameterValue
 from armlab.effects.words import at_place
 from problem.arm import Arm
@@ -45,6 +45,13 @@ def how_it_falls(arm: Arm, joint: int, falls: bool) -> str:
 def effect_in_words(effect: str) -> str:
     """The name of an effect in a sentence; ValueError for an id that no effect has."""
     return effect_named(effect).words
+
+
+def name_of_effect(effect: str) -> str:
+    """The name of an effect without its place: links are masses and inertias, what has no name is unknown."""
+    if effect == UNKNOWN.id:
+        return SOMETHING_UNKNOWN
+    return LINKS_IN_WORDS if effect == INERTIAL_ERROR_FACTS.id else effect_in_words(effect)
 
 
 def compared_in_words(simulation: Simulation) -> str:

@@ -85,6 +85,7 @@ class Look:
 MEASURED_LOOK = Look("measured", palette.MIDDLE, 2.8)
 GIVEN_LOOK = Look("simulation as given", palette.AMBER, 1.3, "6 3")
 REFITTED_LOOK = Look("rigid body refitted", palette.BLUE, 1.3, "2 2")
+PLAIN_LOOK = Look("plain least squares", palette.MIDDLE, 1.3, "2 2")
 FOUND_LOOK = Look("with what was found", palette.DARK_GREEN, 1.4)
 FLOOR_LOOK = Look("noise floor", palette.PLUM, 1.4, "8 3 2 3")
 LAW_LOOK = Look("fitted law", palette.DARK_VERMILION, 2.0)

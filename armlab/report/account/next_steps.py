@@ -11,7 +11,7 @@ from armlab.effects.contract import UNKNOWN
 from armlab.effects.drive import TORQUE_OFFSET_FACTS
 from armlab.effects.library import effect_named
 from armlab.report.account.account import Account, StatedFinding
-from armlab.report.words import is_of_unknown_links, variables_in_words
+from armlab.report.words import SOMETHING_UNKNOWN, is_of_unknown_links, name_of_effect, variables_in_words
 from problem.joint_words import joint_in_words, joints_in_words, links_in_words
 
 MAX_STEPS = 3
@@ -24,8 +24,23 @@ def next_steps(diagnosis: Diagnosis, account: Account) -> tuple[str, ...]:
     for each in account.findings:
         if each.statement.kind != "name" or each.claim.rivals or is_of_unknown_links(each.claim):
             groups.setdefault(_experiment_of(each), []).append(each)
-    steps = dict.fromkeys(step for text, own in groups.items() for step in _steps(text, own, diagnosis, account))
+    steps = dict.fromkeys(
+        f"{_purpose(text, own)}: {step[0].lower()}{step[1:]}"
+        for text, own in groups.items()
+        for step in _steps(text, own, diagnosis, account)
+    )
     return tuple(steps)[:MAX_STEPS]
+
+
+def _purpose(text: str, own: Sequence[StatedFinding]) -> str:
+    """What an experiment decides of findings: which of some names, or whether the one that they have."""
+    if text == FRICTION:
+        return "To know the law of friction"
+    effects = (each for one in own for each in (*one.statement.effects, *(rival.effect for rival in one.claim.rivals)))
+    names = list(dict.fromkeys(name_of_effect(each) for each in effects))
+    if names == [SOMETHING_UNKNOWN]:
+        return "To name what is unknown"
+    return f"To be sure of {names[0]}" if len(names) == 1 else f"To tell {names[0]} from {join_words(names[1:], 'or')}"
 
 
 def _experiment_of(each: StatedFinding) -> str:

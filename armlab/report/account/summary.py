@@ -171,10 +171,10 @@ class _Writer:
         arm, unit = self.diagnosis.simulation.arm, joint_unit(self.diagnosis.simulation.arm, fit.joint - 1)
         left = next((each for each in self.account.left if each.joint == fit.joint), None)
         of = "torque" if unit == "N m" else "force"
-        share = "" if left is None else f", {format_percent(left.share_of_torque)} of its {of}"
+        share = "" if left is None else f" ({format_percent(left.share_of_torque)} of its {of})"
         falls = how_it_falls(arm, fit.joint, fit.after < before)
         return (
-            f"On held-out data the error {falls}: from {format_fixed(before)} "
+            f"On held-out data the error {falls}: from {format_fixed(before)} {unit} "
             f"({compared_in_words(self.diagnosis.simulation)}) to {format_fixed(fit.after)} {unit}{share}."
         )
 

@@ -116,7 +116,7 @@ def _tool_text(diagnosis: MotionDiagnosis) -> str:
     if diagnosis.servos is None:
         return ""
     before, after = diagnosis.tool
-    return "" if before is None else f"At the tool: {1e3 * before:.3g} mm before, {1e3 * after:.3g} mm after."
+    return "" if before is None else f"At the end of the arm: {1e3 * before:.3g} mm before, {1e3 * after:.3g} mm after."
 
 
 def _most_telling_row(diagnosis: MotionDiagnosis) -> int:

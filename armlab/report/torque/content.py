@@ -82,9 +82,7 @@ class SetupPart:
 
 def error_note(diagnosis: Diagnosis, data: ShownResiduals) -> str:
     """What the shares and errors of the first screen are of."""
-    errors = (
-        f"Errors in N m (N) are root mean squares of measured less predicted torque at one joint, both {data.filtered}."
-    )
+    errors = f"Errors are root mean squares of measured less predicted torque at one joint, both {data.filtered}."
     if not diagnosis.claims:
         return f"{errors} On held-out data."
     return (
@@ -107,7 +105,7 @@ def cause_table(diagnosis: Diagnosis) -> Table | None:
         rows.append([cause_name(each, own), place, size, share, _how_sure(own)])
     if open_share(account) > 1 - STATED_SHARE:
         rows.append(["unexplained", "", "", format_share(open_share(account)), ""])
-    return Table(["cause", "where", "how large", "of the error", "how sure"], rows, (0, 1, 2, 4), stacked=True)
+    return Table(["cause", "where", "how large", "share of error", "how sure"], rows, (0, 1, 2, 4), stacked=True)
 
 
 def _place_of_whole_arm(diagnosis: Diagnosis, cause: StatedCause, own: Sequence[StatedFinding]) -> str:
@@ -150,7 +148,8 @@ def _how_sure(own: Sequence[StatedFinding]) -> str:
     chances = sorted(each.statement.probability for each in own)
     least, most = (format_chance(each) for each in (chances[0], chances[-1]))
     is_sure = all(each.statement.kind == "name" for each in own)
-    doubt = "" if is_sure else ", law not certain" if len(own) == 1 else ", not each law certain"
+    what = "law" if own[0].is_friction else "name"
+    doubt = "" if is_sure else f", {what} not certain" if len(own) == 1 else f", not each {what} certain"
     return f"{least}{'' if least == most else ' or more'}{doubt}"
 
 
@@ -347,7 +346,10 @@ def _motion_may_tell(claim: Claim) -> bool:
 
 def _export_text(diagnosis: Diagnosis) -> str:
     if diagnosis.simulation.inertial is None or diagnosis.is_plain:
-        return "A simulator needs masses of links: give the robot file nominal `links`, and diagnose again."
+        return (
+            "A simulator needs masses, which these data alone do not tell: give the robot file nominal `links`, and "
+            "diagnose again."
+        )
     if diagnosis.model is not None and not _is_exportable(diagnosis.model):
         return (
             "A simulator needs links that are possible bodies. The links of this model are not: `armlab identify "

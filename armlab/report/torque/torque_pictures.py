@@ -19,6 +19,7 @@ from armlab.common.report.charts import (
     LAW_LOOK,
     LEFT_MARGIN,
     MEASURED_LOOK,
+    PLAIN_LOOK,
     REFITTED_LOOK,
     RIGHT_MARGIN,
     SURROGATE_LOOK,
@@ -50,12 +51,16 @@ Series = list[tuple[Look, Array]]
 
 
 def draw_errors_by_joint(diagnosis: Diagnosis, data: ShownResiduals) -> Markup:
-    """Held-out error of each joint on a logarithmic axis: as given, refitted, with what was found, noise floor."""
-    residuals = [(REFITTED_LOOK, data.refit), (FOUND_LOOK, data.final)]
-    if data.given is not None:
-        residuals.insert(0, (GIVEN_LOOK, data.given))
+    """Held-out error of each joint on a logarithmic axis: before, plain least squares, what was found, noise floor.
+
+    Before: the simulation as given, else the refitted rigid body.
+    """
     arm, joints = diagnosis.simulation.arm, [each.joint - 1 for each in diagnosis.fit]
-    series: Series = [(look, data.held_out_rms(residual)[joints]) for look, residual in residuals]
+    first = (REFITTED_LOOK, data.refit) if data.given is None else (GIVEN_LOOK, data.given)
+    series: Series = [(look, data.held_out_rms(left)[joints]) for look, left in (first, (FOUND_LOOK, data.final))]
+    plain = [each.plain for each in diagnosis.fit]
+    if diagnosis.simulation.kind != "simulated" and None not in plain:
+        series.insert(1, (PLAIN_LOOK, np.array(plain, dtype=float)))
     floors = np.array([each.noise_floor for each in diagnosis.fit])
     kinds = {joint_unit(arm, joint) for joint in joints}
     axis = fit_axis(f"rms error, {' or '.join(sorted(kinds))}", *(each for _, each in series), floors, log=True)
@@ -112,9 +117,9 @@ def _axis_position(axis: Axis, left: float, value: float) -> float:
 
 def _draw_mark(x: float, y: float, look: Look) -> str:
     """A shape of its own for each series: square, ring, disc, bar."""
-    if look is GIVEN_LOOK:
+    if look in (GIVEN_LOOK, REFITTED_LOOK):
         return svg_element("rect", x=x - 7, y=y - 7, width=14, height=14, fill=look.color)
-    if look is REFITTED_LOOK:
+    if look is PLAIN_LOOK:
         return svg_element("circle", cx=x, cy=y, r=4.6, fill=palette.BACK, stroke=look.color, stroke_width=2.2)
     if look is FOUND_LOOK:
         return svg_element("circle", cx=x, cy=y, r=5, fill=look.color)
