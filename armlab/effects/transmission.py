@@ -325,19 +325,28 @@ class Backlash(Transmission):
             return looks
         gaps = cls._gaps(arm, joint, SCANNED_GAPS.tolist())
         alike = _resemblance(gaps, scenes, residuals, joint - 1)
-        decided = (each for each in (gaps[place] for place in np.argsort(-alike)) if each.is_decided_by(scenes))
+        decided = cls.decided_by([gaps[place] for place in np.argsort(-alike)], scenes)
         return [replace(each, looks=len(gaps)) for each in islice(decided, KEPT_GAPS)]
 
-    def is_decided_by(self, scenes: Sequence[Scene]) -> bool:
-        """Whether the recording tells the twist: where it rattles, the least error of the load grows to another one."""
-        change = size = 0.0
-        for scene in scenes:
-            load = load_at(scene, self.index)
-            more = replace(load, torque=(1 + LOAD_CHANGE) * load.torque)
-            torque, other = (integrate_twist(each, self.law[0])[2] * load.inertia for each in (load, more))
-            change += float(np.sum((other - torque) ** 2))
-            size += float(np.sum(torque**2))
-        return change <= (LOAD_CHANGE / LOAD_ERROR) ** 2 * size
+    @classmethod
+    def decided_by(cls, gaps: Sequence[Self], scenes: Sequence[Scene]) -> Iterator[Self]:
+        """Those gaps of a joint of which the recording tells the twist, some at a time.
+
+        Where it rattles, the least error of the load grows to another twist.
+        """
+        loads = [load_at(scene, gaps[0].index) for scene in scenes]
+        for start in range(0, len(gaps), SIDE_BY_SIDE):
+            some = gaps[start : start + SIDE_BY_SIDE]
+            change, size = np.zeros(len(some)), np.zeros(len(some))
+            for load in loads:
+                more = replace(load, torque=(1 + LOAD_CHANGE) * load.torque)
+                torque, other = (
+                    integrate_twists(each, [gap.law[0] for gap in some])[:, 2] * load.inertia for each in (load, more)
+                )
+                change += np.sum((other - torque) ** 2, axis=1)
+                size += np.sum(torque**2, axis=1)
+            tells = change <= (LOAD_CHANGE / LOAD_ERROR) ** 2 * size
+            yield from (gap for gap, told in zip(some, tells, strict=True) if told)
 
     @classmethod
     def _gaps(cls, arm: Arm, joint: int, gaps: Sequence[float]) -> list[Self]:
