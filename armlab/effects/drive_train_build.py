@@ -17,5 +17,5 @@ ffibuilder.cdef(DECLARED)
 ffibuilder.set_source(
     "armlab.effects._drive_train",
     Path(__file__).with_name("drive_train.c").read_text(),
-    extra_compile_args=["-O3", "-ffp-contract=off"],
+    extra_compile_args=["-O3", "-ffp-contract=off", "-Wno-psabi"],
 )

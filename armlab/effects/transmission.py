@@ -178,7 +178,7 @@ SCANNED_GAPS = np.geomspace(2e-5, 2e-2, 32)
 KEPT_GAPS = 2  # gaps of a scan
 LOAD_CHANGE = 1e-6  # of a load, that tells whether a twist is decided by it
 LOAD_ERROR = 0.01  # of a load: were all of a twist's torque another one with it, nothing would tell it
-SIDE_BY_SIDE = 8  # gaps that are integrated at a time, as many as there are lanes in drive_train.c
+SIDE_BY_SIDE = 16  # gaps that are integrated at a time, as many as there are lanes in drive_train.c
 
 
 @dataclass(frozen=True)
