@@ -41,12 +41,13 @@ from problem.simulator_check import check_with_mujoco, left_out_of_urdf
 
 FACTOR_OF_UNITS = 3.0  # times a limit: less beyond it is a peak, or a limit of long use
 RESTING_SHARE = 1e-3  # of the speed of the fastest joint of a run: a joint that is slower rests
+REGULAR_SHARE = 0.9  # of the steps between changes of the positions, that are whole holds of a slower reader
 MIN_FROZEN_TIME_S = 0.25  # a torque that repeats to the last digit for so long while its joint moves
 
 
 def check_channels(run: MotionRun, arm: Arm) -> tuple[Finding, ...]:
     """Warnings about the channels of a run, joint by joint."""
-    findings: list[Finding] = []
+    findings = _find_held_rows(run)
     for joint in range(run.joints):
         findings += _find_dead_channels(run, arm, joint) + _find_limit_violations(run, arm, joint)
         if isinstance(run, Run):
@@ -58,6 +59,7 @@ def check_channels(run: MotionRun, arm: Arm) -> tuple[Finding, ...]:
 SIGNS = (
     "joint_names",
     "rate",
+    "held_rows",
     "beyond_limits",
     "velocity_mismatch",
     "lost_rows",
@@ -78,6 +80,17 @@ def signs_of_wrong_reading(recording: Recording | MotionRecording) -> tuple[Find
         found += compare_standstill(recording, links, ReadingTuning())
     first = {(each.kind, each.joint): each for each in reversed(found) if each.kind in SIGNS}
     return tuple(reversed(first.values()))
+
+
+def _find_held_rows(run: MotionRun) -> list[Finding]:
+    """Whether all positions change at every so many-th row alone, as where a log is written faster than it is read."""
+    steps = np.diff(np.flatnonzero(np.any(np.diff(run.position, axis=0) != 0, axis=1)))
+    rows = int(np.median(steps)) if len(steps) else 1
+    if rows < 2 or np.mean(steps % rows == 0) < REGULAR_SHARE:
+        return []
+    read = f"{run.rate_hz / rows:.4g} Hz, not {run.rate_hz:.4g} Hz"
+    text = f"positions change every {rows} rows alone: they were read at {read}; keep the last row before each change"
+    return [Finding("held_rows", "warning", text)]
 
 
 def _joint_warning(kind: str, joint: int, text: str) -> list[Finding]:

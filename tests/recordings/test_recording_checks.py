@@ -60,6 +60,15 @@ def test_a_torque_that_freezes_while_the_joint_moves_is_named() -> None:
     assert said(run_of(table)) == [("frozen_channel", 1)]
 
 
+def test_a_log_that_is_written_faster_than_its_positions_are_read_is_named() -> None:
+    table = frame()
+    held = np.arange(len(table)) // 4 * 4
+    table[POSITION] = table[POSITION].to_numpy()[held]
+    assert said(run_of(table)) == [("held_rows", None)]
+    table[POSITION] = np.round(frame()[POSITION], 2)  # of a coarse encoder: the steps follow the speed
+    assert said(run_of(table)) == []
+
+
 def test_positions_in_degrees_that_were_called_radians_pass_the_limits() -> None:
     table = frame()
     table["q1"] = np.rad2deg(table["q1"])
