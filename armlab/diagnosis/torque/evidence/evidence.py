@@ -162,25 +162,34 @@ class Judge:
         more = {other for group in self.state.groups for other in self.simpler(group)}
         return StatesCompared(self.model, self.state, frozenset(more))
 
+    @cached_property
+    def scores(self) -> dict[int, float]:
+        """What each group adds to the score of the state."""
+        losses = self.model.solver.losses(self.model.solver.fit(self.state))
+        return {group: -losses[group] for group in self.state.groups}
+
+    @cached_property
+    def _spread(self) -> BlockCovariance:
+        return self.compared.covariance_of(self.state)
+
     def effects(self) -> dict[int, Evidence]:
         """Evidence for each group."""
+        return {group: self.effect(group) for group in self.state.groups}
+
+    def effect(self, group: int) -> Evidence:
+        """Evidence for a group."""
         solver, state = self.model.solver, self.state
-        fit = solver.fit(state)
-        spread, losses = self.compared.covariance_of(state), solver.losses(fit)
-        out = {}
-        for group in state.groups:
-            candidate = solver.candidate(group)
-            values = solver.values(fit, group)
-            objection = solver.objection(group, values, self._covariance(fit, spread, group))
-            tested = self._tested(fit, spread, group), self.looks(group)
-            evidence = self._against(state.minus(group), tested, candidate.rows, -losses[group])
-            if self.simpler(group) and not self._in_place_of_usual(group):
-                evidence = self._beyond_usual(group)
-            if candidate.facts.single_event:
-                evidence = replace(evidence, repeatable=False)
-                objection = self._pushed(group)
-            out[group] = replace(evidence, objection=objection, usual=candidate.facts.usual)
-        return out
+        fit, candidate = solver.fit(state), solver.candidate(group)
+        objection = solver.objection(group, solver.values(fit, group), self._covariance(fit, self._spread, group))
+        if self.simpler(group) and not self._in_place_of_usual(group):
+            evidence = self._beyond_usual(group)
+        else:
+            tested = self._tested(fit, self._spread, group), self.looks(group)
+            evidence = self._against(state.minus(group), tested, candidate.rows, self.scores[group])
+        if candidate.facts.single_event:
+            evidence = replace(evidence, repeatable=False)
+            objection = self._pushed(group)
+        return replace(evidence, objection=objection, usual=candidate.facts.usual)
 
     def jointly(self, groups: Sequence[int]) -> Evidence:
         """Evidence for some groups at one place together, of which nothing else was looked at."""
@@ -189,7 +198,7 @@ class Judge:
         columns = np.concatenate([self.model.solver.groups[each].columns for each in groups])
         place = [at for each in groups for at in self._place(fit, each)]
         largest = self.model.design.settings.tuning.blocks.max_variance_ratio
-        p_value = self.compared.covariance_of(self.state).p_value(fit.coefficients[columns], place, largest)
+        p_value = self._spread.p_value(fit.coefficients[columns], place, largest)
         rows = self.model.solver.groups[groups[0]].candidate.rows
         evidence = self._against(less, (p_value, 1), rows, fit.score - self.model.solver.fit(less).score)
         return replace(evidence, usual=all(self.model.candidate(each).facts.usual for each in groups))

@@ -164,28 +164,46 @@ def _remove_failing(belief: Belief) -> Belief:
     while True:
         groups, state = model.solver.groups, model.state
         judge = Judge(model, state)
-        effects = judge.effects()
-        failed = {
-            group: why for group, each in effects.items() if (why := first_failed_test(each, settings)) is not None
-        }
-        held = [group for group in failed if model.solver.is_held(state, group) and effects[group].objection is None]
-        bad = {group: why for group, why in failed.items() if group not in held}
-        if not bad:
+        tested = _test_in_turn(judge, settings)
+        if isinstance(tested, dict):
             anew = find_body_anew(model)
             if anew is model or found_anew >= settings.tuning.pruning.max_cycles:
-                present = {group: effects.pop(group) for group in held}
-                return replace(belief, model=model, effects=effects, present=present, banned=banned)
+                held = [group for group, each in tested.items() if first_failed_test(each, settings) is not None]
+                present = {group: tested.pop(group) for group in held}
+                return replace(belief, model=model, effects=tested, present=present, banned=banned)
             model, found_anew = anew, found_anew + 1
             continue
-        weakest = min(bad, key=lambda group: (not judge.simpler(group), effects[group].score))
+        weakest, failed = tested
         gone = _groups_to_remove(judge, weakest)
-        steps = list(model.steps)
-        steps += [Step.against(model.candidate(group), bad.get(group, bad[weakest])) for group in gone]
+        steps = [*model.steps, *(Step.against(model.candidate(group), failed) for group in gone)]
         places = {groups[group].place for group in gone}
         banned |= {number for number, each in enumerate(groups) if each.place in places}
         back = {other for group in gone for other in judge.simpler(group)}
         state = State(tuple(sorted(set(state.groups) - gone | back)), state.widths)
         model = replace(model, state=state, steps=tuple(steps))
+
+
+def _test_in_turn(judge: Judge, settings: Settings) -> dict[int, Evidence] | tuple[int, FailedTest]:
+    """The evidence for all effects where none has to leave; else the one that leaves first, and why.
+
+    The weakest special law at a joint is the first, then the weakest of the others: those that are stronger need no
+    test. Usual friction that no law contradicts is held.
+    """
+    special = [group for group in judge.state.groups if judge.simpler(group)]
+    others = sorted(set(judge.state.groups) - set(special), key=lambda group: judge.scores[group])
+    effects = dict[int, Evidence]()
+    for some in (special, *([group] for group in others)):
+        failed = dict[int, FailedTest]()
+        for group in some:
+            effects[group] = judge.effect(group)
+            why = first_failed_test(effects[group], settings)
+            is_held = effects[group].objection is None and judge.model.solver.is_held(judge.state, group)
+            if why is not None and not is_held:
+                failed[group] = why
+        if failed:
+            weakest = min(failed, key=lambda group: effects[group].score)
+            return weakest, failed[weakest]
+    return {group: effects[group] for group in judge.state.groups}
 
 
 def _groups_to_remove(judge: Judge, weakest: int) -> set[int]:

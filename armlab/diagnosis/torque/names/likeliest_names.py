@@ -78,5 +78,5 @@ def _added(model: FittedModel, search: Search, group: int) -> Found | None:
     state = search.with_group(model.state, group)
     if search.objection(state, group) is not None:
         return None
-    evidence = Judge(replace(model, state=state), state).effects()[group]
+    evidence = Judge(replace(model, state=state), state).effect(group)
     return (group, state, evidence) if evidence.score >= 0 and evidence.objection is None else None
