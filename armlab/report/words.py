@@ -25,6 +25,11 @@ COMPARED: Mapping[Baseline, str] = {
     "refit": "rigid body refitted",
     "simulated": "torque simulated elsewhere",
 }
+STARTED: Mapping[Baseline, str] = {  # whose error falls
+    "nominal": "the simulation",
+    "refit": "the refitted rigid body",
+    "simulated": "the simulated torque",
+}
 SOMETHING_UNKNOWN = "something unknown"
 LESS_MASS = "less mass than modelled"
 LINKS_IN_WORDS = "masses and inertias"  # where these data do not tell which of them is off

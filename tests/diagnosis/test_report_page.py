@@ -162,7 +162,7 @@ def test_the_verdict_says_where_the_error_comes_from_how_large_it_is_and_what_is
     page, _ = opened(browser, address, 1200)
     verdict = page.locator(".verdict").inner_text().replace("\N{NO-BREAK SPACE}", " ")
     assert re.match(r"[\w ]*\d+ % of the error comes from ", verdict)
-    gain = r"falls most at [^:]+: from [\d.]+ N m \(simulation as given\) to [\d.]+ N m \([\d.]+ % of its torque\)\."
+    gain = r"the simulation falls most at [^:]+: from [\d.]+ to [\d.]+ N m \([\d.]+ % of its torque\)\."
     assert re.search(gain, verdict)
     page.close()
 

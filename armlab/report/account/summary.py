@@ -18,8 +18,8 @@ from armlab.report.account.account import Account, StatedFinding, account_of
 from armlab.report.torque.sentences import claim_figures, model_in_words
 from armlab.report.words import (
     LINKS_IN_WORDS,
+    STARTED,
     claim_name,
-    compared_in_words,
     effect_in_words,
     format_fixed,
     format_percent,
@@ -174,8 +174,8 @@ class _Writer:
         share = "" if left is None else f" ({format_percent(left.share_of_torque)} of its {of})"
         falls = how_it_falls(arm, fit.joint, fit.after < before)
         return (
-            f"On held-out data the error {falls}: from {format_fixed(before)} {unit} "
-            f"({compared_in_words(self.diagnosis.simulation)}) to {format_fixed(fit.after)} {unit}{share}."
+            f"On held-out data the error of {STARTED[self.diagnosis.simulation.kind]} {falls}: "
+            f"from {format_fixed(before)} to {format_fixed(fit.after)} {unit}{share}."
         )
 
     def _largest_fall(self) -> tuple[JointFit, float]:
