@@ -139,7 +139,7 @@ def calibrate_reading(work: Path, out: Path, jobs: int) -> Iterator[str]:
 
 @click.command()
 @click.argument("folder", type=_PATH)
-@click.option("--cases", type=click.IntRange(min=1), default=100, show_default=True, help="The first so many.")
+@click.option("--cases", type=click.IntRange(min=1), default=100, show_default=True, help="So many, small arms first.")
 @click.option("--repetitions", type=click.IntRange(min=2), default=20, show_default=True, help="As of `diagnose`.")
 @click.option("--work", type=OutputPath(), default=Path(".armlab/survival"), show_default=True)
 @click.option("--results", type=OutputPath(), default=Path("results/proof"), show_default=True)
@@ -162,7 +162,9 @@ def survival(folder: Path, cases: int, repetitions: int, work: Path, results: Pa
         yield f"  {name}: {done} of at most {cases}"
     found = read_survivals(folder, cases, work)
     yield from (f"{about}: {count} names, right {right}" for about, count, right in survival_rows(found))
-    for path in write_survival(found, f"{done} development cases, {repetitions} times with all findings", results):
+    for path in write_survival(
+        found, f"{done} development cases, small arms first, {repetitions} times with all findings", results
+    ):
         yield f"wrote {path}"
 
 

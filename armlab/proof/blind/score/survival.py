@@ -19,6 +19,7 @@ from armlab.proof.blind.formats import SetManifest
 from armlab.proof.blind.score.cases import RIGHT_CATEGORIES, categorize_finding, read_cases
 from armlab.proof.blind.score.weighed_names import check_development
 from armlab.proof.blind.sealed import OBSERVATIONS, answer, is_answered, read_checked_manifest
+from armlab.recordings.load import open_recording
 
 SHARES = (0.0, 0.5, 0.9, 1.0)  # of the simulated recordings in which a name returns
 COLUMNS = ["case", "tier", "effect", "joint", "probability", "returned", "simulated", "appeared", "left_out", "right"]
@@ -61,9 +62,14 @@ def read_survivals(folder: Path, cases: int, work: Path) -> pd.DataFrame:
 
 
 def _names(folder: Path, cases: int) -> Sequence[str]:
+    """The first cases of a set, those of small arms before others: each is diagnosed dozens of times."""
     manifest, _ = read_checked_manifest(folder, SetManifest)
     check_development(manifest.seed, folder)
-    return manifest.cases[:cases]
+    return sorted(manifest.cases, key=lambda name: _joints(folder / OBSERVATIONS / name))[:cases]
+
+
+def _joints(recording: Path) -> int:
+    return len(open_recording(recording)[0].arm)
 
 
 def survival_rows(found: pd.DataFrame) -> list[tuple[str, ...]]:
