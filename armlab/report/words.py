@@ -71,6 +71,14 @@ def finding_in_words(arm: Arm, claim: Claim) -> str:
     return at_place(arm, claim_in_words(claim), claim.effect, claim.joint, claim.joints)
 
 
+def stated_in_words(arm: Arm, claim: Claim, statement: Statement) -> str:
+    """A finding with its place, by all names of its class, the likeliest first."""
+    if statement.kind != "class":
+        return finding_in_words(arm, claim)
+    names = join_words([effect_in_words(each) for each in statement.effects], "or")
+    return at_place(arm, names, claim.effect, claim.joint, claim.joints)
+
+
 def rival_in_words(arm: Arm, rival: Rival) -> str:
     """An effect that fits as well, with its place."""
     return at_place(arm, effect_in_words(rival.effect), rival.effect, rival.joint, rival.joints)
@@ -231,7 +239,8 @@ def format_percent(value: float) -> str:
 
 def format_growth(before: float, after: float) -> str:
     """`42 times as large` of an error without a finding, before, and with it, after."""
-    return f"{format_number(before / max(after, 1e-300), 3 if before < 2 * after else 2)} times as large"
+    ratio = format_number(before / max(after, 1e-300), 3 if before < 2 * after else 2)
+    return "as large" if ratio == "1" else f"{ratio} times as large"
 
 
 def format_gap(closed: float | None) -> str:

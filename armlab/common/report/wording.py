@@ -12,6 +12,8 @@ def format_number(value: float, digits: int = 3) -> str:
     text = f"{value:.{digits}g}"
     if 10**digits <= size < 1e6:
         text = f"{value:.0f}"
+    elif "e" in text and 1 <= size < 1e6:  # what is rounded up to the next power of ten
+        text = f"{float(text):.0f}"
     elif size >= 1e6 or 0 < size < 1e-4:
         text = f"{value:.{digits - 1}e}"
     return text.replace("-", "−")

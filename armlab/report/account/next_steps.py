@@ -38,6 +38,8 @@ def _purpose(text: str, own: Sequence[StatedFinding]) -> str:
         return "To know the law of friction"
     effects = (each for one in own for each in (*one.statement.effects, *(rival.effect for rival in one.claim.rivals)))
     names = list(dict.fromkeys(name_of_effect(each) for each in effects))
+    if all(is_of_unknown_links(each.claim) for each in own):
+        return "To know which link is off"
     if names == [SOMETHING_UNKNOWN]:
         return "To name what is unknown"
     return f"To be sure of {names[0]}" if len(names) == 1 else f"To tell {names[0]} from {join_words(names[1:], 'or')}"
@@ -52,7 +54,9 @@ def _experiment_of(each: StatedFinding) -> str:
 def _steps(text: str, own: Sequence[StatedFinding], diagnosis: Diagnosis, account: Account) -> Iterator[str]:
     arm = diagnosis.simulation.arm
     joints = sorted({each.claim.joint for each in own if each.claim.joint is not None})
-    if text == FRICTION and any(account.friction_of(joint) for joint in joints):
+    if all(is_of_unknown_links(each.claim) for each in own):
+        yield "Compare the masses and centres of all links with CAD data, or repeat the motion with a known payload."
+    elif text == FRICTION and any(account.friction_of(joint) for joint in joints):
         yield _friction_step(joints, diagnosis, account)
     elif text == TORQUE_OFFSET_FACTS.experiment and joints:
         yield _offset_step(joints, diagnosis)

@@ -118,7 +118,7 @@ class _Writer:
         ]
         unexplained = open_share(self.account)
         if unexplained > 1 - STATED_SHARE:
-            forms.append((f"{100 * unexplained:.0f} % stays unexplained",) * 2)
+            forms.append((f"{100 * unexplained:.0f} % cannot be named",) * 2)
         return f"{list_while_short(forms)}."
 
     def cause_in_words(self, cause: StatedCause) -> str:

@@ -13,8 +13,8 @@ from armlab.report.account.next_steps import MAX_STEPS
 from armlab.report.motion.motion_words import (
     current_phrase,
     finding_phrases,
-    finding_with_numbers,
     remarks,
+    stated_with_numbers,
     summary_of,
     untold_numbers,
 )
@@ -67,9 +67,8 @@ def joint_table(diagnosis: MotionDiagnosis) -> Table:
     for each in diagnosis.errors:
         stated = [one for one in stated_numbers(diagnosis) if not one.minor]
         own = [one for one in stated if one.finding.joint == each.joint]
-        words = "; ".join(finding_with_numbers(one.finding) for one in own)
-        chances = [one.naming.probability_of(one.finding.effect, one.finding.joint) for one in own]
-        sure = "; ".join(format_chance(each) for each in chances)
+        words = "; ".join(stated_with_numbers(one) for one in own)
+        sure = "; ".join(format_chance(one.statement.probability) for one in own)
         before = "" if each.replay_before is None else f"{1e3 * each.replay_before:.3g} → "
         errors = f"{before}{1e3 * each.replay_after:.3g} mrad"
         rows.append((joint_in_table(arm, each.joint), words, sure, errors))

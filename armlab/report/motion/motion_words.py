@@ -143,7 +143,7 @@ def _odd_sentence(diagnosis: MotionDiagnosis) -> str:
         return ""
     shown = ", ".join(f"{run} {start:.0f} to {end:.0f} s" for run, start, end in diagnosis.odd[:3])
     more = f" and {len(diagnosis.odd) - 3} more" if len(diagnosis.odd) > 3 else ""
-    return f"Something else than the servos moves the arm in {shown}{more}: contact, or commands that came late."
+    return f"No servo of this law moves as in {shown}{more}: contact, late commands, or physics that is missing."
 
 
 def motion_lines(diagnosis: MotionDiagnosis, verbose: bool = False) -> Iterator[str]:
@@ -178,8 +178,8 @@ def finding_phrases(diagnosis: MotionDiagnosis, minor: bool) -> list[str]:
 def _finding_phrase(arm: Arm, stated: StatedNumber) -> str:
     finding = stated.finding
     also = f"; it could also be {_effects_in_words(finding.rivals)}" if finding.rivals else ""
-    chance = format_chance(stated.naming.probability_of(finding.effect, finding.joint))
-    return f"{_places(arm, [finding])}: {finding_with_numbers(finding)}; probability of the name {chance}{also}"
+    chance = format_chance(stated.statement.probability)
+    return f"{_places(arm, [finding])}: {stated_with_numbers(stated)}; probability {chance}{also}"
 
 
 def _effects_in_words(effects: Sequence[str]) -> str:
@@ -195,10 +195,14 @@ def untold_numbers(rivals: Mapping[int, tuple[str, ...]]) -> list[tuple[str, str
     ]
 
 
-def finding_with_numbers(finding: ServoFinding) -> str:
-    """The name of a finding, its number with the interval, and that of the simulation."""
+def stated_with_numbers(stated: StatedNumber) -> str:
+    """What is wrong, by all names of its class: its number with the interval, and that of the simulation."""
+    finding, statement = stated.finding, stated.statement
+    others = [each for each in statement.effects if each != finding.effect] if statement.kind == "class" else []
+    rivals = f" or {_effects_in_words(others)}" if others else ""
+    doubt = " (not certain)" if statement.kind == "cause" else ""
     value, known = _figures(finding)
-    return f"{_number_name(finding)}, {value}{f'; the simulation has {known}' if known else ''}"
+    return f"{_number_name(finding)}{rivals}{doubt}, {value}{f'; the simulation has {known}' if known else ''}"
 
 
 def _figure_at_place(arm: Arm, finding: ServoFinding) -> str:

@@ -27,7 +27,6 @@ from armlab.report.words import (
     PARAMETER_DIGITS,
     compared_in_words,
     effect_in_words,
-    finding_in_words,
     format_chance,
     format_gap,
     format_growth,
@@ -37,6 +36,7 @@ from armlab.report.words import (
     member_in_words,
     parameter_rows,
     rival_in_words,
+    stated_in_words,
     statement_in_words,
     survival_in_words,
     variable_in_words,
@@ -57,10 +57,9 @@ class Origin:
 
 @dataclass(frozen=True)
 class FindingDetail:
-    """One finding. share: of the error that it explains. picture: its evidence. chance: how sure it is."""
+    """One finding. picture: its evidence. chance: how sure it is."""
 
     title: str
-    share: str
     error: str
     about: str
     equation: str
@@ -104,7 +103,7 @@ def cause_table(diagnosis: Diagnosis) -> Table | None:
         share, size = format_share(each.share), _cause_size(diagnosis, each)
         rows.append([cause_name(each, own), place, size, share, _how_sure(own)])
     if open_share(account) > 1 - STATED_SHARE:
-        rows.append(["unexplained", "", "", format_share(open_share(account)), ""])
+        rows.append(["cannot be named", "", "", format_share(open_share(account)), ""])
     return Table(["cause", "where", "how large", "share of error", "how sure"], rows, (0, 1, 2, 4), stacked=True)
 
 
@@ -239,12 +238,11 @@ def _finding_detail(diagnosis: Diagnosis, finding: StatedFinding, picture: Marku
         f"{format_number(after)} {size} with it. p-value {format_probability(claim.evidence.corrected)} after "
         "correction for everything that was compared."
     )
-    chance = statement_in_words(finding.statement)
+    title, chance = stated_in_words(arm, claim, finding.statement), statement_in_words(finding.statement)
     if claim.survival is not None:
         chance += f"; {survival_in_words(claim.survival)}"
     return FindingDetail(
-        title=_finding_at_start(arm, claim),
-        share=format_share(finding.share),
+        title=f"{title[0].upper()}{title[1:]}",
         error=f"without it the error of {where} is {format_growth(before, after)}",
         about=effect_named(claim.effect).meaning,
         equation=claim.equation,
@@ -255,12 +253,6 @@ def _finding_detail(diagnosis: Diagnosis, finding: StatedFinding, picture: Marku
         rivals=_rival_texts(arm, claim),
         next_experiment=claim.next_experiment or "",
     )
-
-
-def _finding_at_start(arm: Arm, claim: Claim) -> str:
-    """A finding with its place, at the start of a line."""
-    words = finding_in_words(arm, claim)
-    return words[0].upper() + words[1:]
 
 
 def parameter_table(claim: Claim) -> Table:

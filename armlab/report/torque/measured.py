@@ -146,6 +146,14 @@ def _together(text: str) -> str:
     return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
+def law_in_words(found: StatedFinding) -> str:
+    """The name of a finding, then what else it may be; of a class the likeliest first."""
+    if found.statement.kind != "class":
+        return f"{effect_in_words(found.claim.effect)}{doubt_in_words(found)}"
+    first, *others = (effect_in_words(each) for each in found.statement.effects)
+    return f"{first}, or {join_words(others, 'or')}" if others else first
+
+
 def doubt_in_words(found: StatedFinding) -> str:
     """What else it may be: the other names of its class, or that its law is not certain."""
     if found.statement.kind == "class":

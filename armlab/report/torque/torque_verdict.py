@@ -13,7 +13,7 @@ from armlab.recordings.reading.answer import SetupFinding
 from armlab.report.account.account import Account, StatedFinding, account_of, finding_errors
 from armlab.report.account.next_steps import next_steps
 from armlab.report.account.summary import physics_in_words, reading_in_words, sentences_of, shorter_list
-from armlab.report.torque.measured import NOTHING, doubt_in_words, friction_cell
+from armlab.report.torque.measured import NOTHING, doubt_in_words, friction_cell, law_in_words
 from armlab.report.torque.residuals import select_residuals
 from armlab.report.torque.sentences import claim_figures, model_in_words, simulated_figures
 from armlab.report.words import (
@@ -24,12 +24,12 @@ from armlab.report.words import (
     format_growth,
     format_percent,
     format_probability,
-    format_share,
     is_excess,
     is_of_unknown_links,
     joint_unit,
     rival_in_words,
     shorten_name,
+    stated_in_words,
     statement_in_words,
     survival_in_words,
     variables_in_words,
@@ -58,10 +58,11 @@ def verdict_sentences(diagnosis: Diagnosis) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class FirstScreen:
-    """What a reader sees first: a headline, and paragraphs below it."""
+    """What a reader sees first: a headline, paragraphs below it, and warnings about the recording."""
 
     headline: str
     paragraphs: tuple[str, ...]
+    warnings: tuple[str, ...]
 
 
 def first_screen(diagnosis: Diagnosis) -> FirstScreen:
@@ -69,7 +70,8 @@ def first_screen(diagnosis: Diagnosis) -> FirstScreen:
     first, second = verdict_sentences(diagnosis)
     if diagnosis.setup is not None and diagnosis.setup.mistakes and diagnosis.claims:
         second = f"Of the recording read rightly: {second[0].lower()}{second[1:]}"
-    return FirstScreen(first, (second,) if second else ())
+    warnings = [f"Warning: {each.text}." for each in diagnosis.signs if each.severity != "note"]
+    return FirstScreen(first, (second,) if second else (), tuple(warnings[:MAX_WARNINGS]))
 
 
 def _largest_error_text(worst: JointFit, arm: Arm) -> str:
@@ -146,7 +148,7 @@ def _found_in_words(found: Sequence[StatedFinding], simulation: Simulation) -> s
     words = [shorter_list([effect_in_words(each.claim.effect) for each in laws])] if laws else []
     for each in found:
         if each.cause == FRICTION and each not in laws and not each.claim.simulated:
-            words.append(f"{effect_in_words(each.claim.effect)}{doubt_in_words(each)}")
+            words.append(law_in_words(each))
         elif each not in laws:
             numbers = claim_figures(_shorter(each.claim), simulation)
             links = " of the links, which is not certain" if is_of_unknown_links(each.claim) else ""
@@ -220,12 +222,12 @@ def _finding_lines(number: int, finding: StatedFinding, simulation: Simulation) 
     present = simulated_figures(claim)
     law = f"{law}; the simulation has {present}" if present else law
     small = "small: " if claim.minor else ""
-    lines = wrap(f"{small}{finding_in_words(arm, claim)}: {law}", LINE_WIDTH - 5)
+    lines = wrap(f"{small}{stated_in_words(arm, claim, finding.statement)}: {law}", LINE_WIDTH - 5)
     yield f"{number:>3}. {lines[0]}"
     yield from (f"     {line}" for line in lines[1:])
     where = joint_in_words(arm, (claim.removal or claim.evidence).joint + 1)
     growth, probability = format_growth(*finding_errors(claim)), format_probability(claim.evidence.corrected)
-    gain = f"{format_share(finding.share)} of the error; without it the held-out error of {where} is {growth}"
+    gain = f"without it the held-out error of {where} is {growth}"
     whole = f"{gain}; p {probability}; {statement_in_words(finding.statement)}"
     if claim.survival is not None:
         whole += f"; {survival_in_words(claim.survival)}"

@@ -54,9 +54,9 @@ def joint_fits(
             HeldOutErrors(*(float(np.sqrt(np.mean(each[rows, joint] ** 2))) for each in residuals))
             for residuals in (filtered, recorded)
         )
-        noise = min(most, smooth.after)  # what leaves less on held-out rows shows that there is less
+        yardstick = None if left is None else float(np.sqrt(np.mean(left[rows, joint] ** 2)))
+        noise = min(most, smooth.after, yardstick or most)  # what leaves less on held-out rows shows that there is less
         gap = smooth.before - noise
         closed = (smooth.before - smooth.after) / gap if gap > tuning.claims.min_gap * noise else None
-        yardstick = None if left is None else float(np.sqrt(np.mean(left[rows, joint] ** 2)))
         out.append(JointFit(joint + 1, smooth, raw, noise, closed, yardstick))
     return tuple(out)
