@@ -52,6 +52,17 @@ def test_damping_stays_where_it_is_without_a_change_and_where_kd_would_be_negati
     assert chosen_servo(nominal, "damping", damping=0.1).with_damping_inside() is None
 
 
+def test_damping_is_told_beside_the_kd_that_is_stated_where_no_other_kd_was_found() -> None:
+    both, nominal = [place("kd"), place("damping")], numbers(kp=20.0, kd=0.5)
+    outside = chosen_servo(nominal, "damping", kd=0.01, damping=1.26)
+    assert outside.beside_kd(0.5)[both] == pytest.approx([0.5, 0.77])
+    inside = chosen_servo(nominal, "damping", kd=1.27, damping=0.0)
+    assert inside.beside_kd(0.5)[both] == pytest.approx([1.27, 0.0])
+    assert chosen_servo(nominal, "kd", kd=0.01, damping=1.26).beside_kd(0.5)[both] == pytest.approx([0.01, 1.26])
+    weak = chosen_servo(nominal, "damping", kd=0.0, damping=0.4)  # the joint cannot drive itself
+    assert weak.beside_kd(0.5)[both] == pytest.approx([0.0, 0.4])
+
+
 def test_named_numbers_alone_differ_from_the_simulation() -> None:
     values, free = chosen_servo(numbers(kp=8.0, friction=0.05), "friction", kp=9.0, friction=0.08).named
     assert values[[place("kp"), place("friction")]] == pytest.approx([8.0, 0.08])

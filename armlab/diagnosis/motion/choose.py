@@ -99,6 +99,23 @@ class ChosenServo:
     odd: NDArray[np.intp]
     cost: float
 
+    @property
+    def has_other_kd(self) -> bool:
+        """Whether kd differs from the simulation's by more than the damping outside the drive does."""
+        changes = np.abs(self.fit.values - self.nominal)
+        return bool(changes[place("kd")] > changes[place("damping")])
+
+    def beside_kd(self, stated: float) -> Array:
+        """The numbers, (parameters,), with the kd that is stated, where another one was not found, and the same sum.
+
+        This is the servo as findings tell it: the fit may have more of the damping outside the drive.
+        """
+        kd, damping, values = place("kd"), place("damping"), self.fit.values.copy()
+        left = float(values[damping] + values[kd] - stated)
+        if kd not in self.gains and not self.has_other_kd and left >= 0:
+            values[[kd, damping]] = stated, left
+        return values
+
     def with_damping_inside(self) -> "ChosenServo | None":
         """The same with the change of damping in kd, on which the torque limit acts; None where there is no change.
 

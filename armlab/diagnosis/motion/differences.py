@@ -244,13 +244,14 @@ def _with_unknown_clock(said: _Said, ki: float, tuning: MotionTuning) -> _Said:
 def _name_damping(chosen: ChosenServo, given: Array) -> _Said:
     """The damping of a joint beside the simulation's kd, or another kd. given: numbers of the simulation.
 
-    With an unknown kp, it is that of joint and drive together. Friction is not negative: below none, kd is too large.
+    With an unknown kp, it is that of joint and drive together. What was changed more has the name. Friction is not
+    negative: below none, kd is too large.
     """
     kd, damping = place("kd"), place("damping")
     values, nominal = chosen.fit.values, float(given[damping])
     half = float(chosen.fit.interval()[1, damping] - values[damping])
     value = float(values[damping] + values[kd] - given[kd])
-    if values[kd] != chosen.nominal[kd] and np.isfinite(given[place("kp")]):
+    if chosen.has_other_kd and np.isfinite(given[place("kp")]):
         found = value - nominal + float(given[kd])
         return _Said("controller_gain_error", "kd", found, (max(found - half, 0.0), found + half), float(given[kd]))
     if value + half < 0:

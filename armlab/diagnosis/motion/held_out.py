@@ -13,7 +13,7 @@ from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.motion_result import MotionDiagnosis, ReplayError, ServoFinding
 from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay
-from armlab.diagnosis.motion.servo import Servos
+from armlab.diagnosis.motion.servo import Servos, place
 from armlab.diagnosis.motion.servo_simulation import ServoSimulation
 from armlab.diagnosis.motion.shared_number import (
     TOOL_MASS,
@@ -127,7 +127,7 @@ def _values_after(simulation: ServoSimulation, number: int, chosen: ChosenServo 
     """
     nominal = simulation.nominal.values[number]
     if chosen is not None and (named or not np.isfinite(nominal).all()):
-        return chosen.fit.values
+        return chosen.beside_kd(float(nominal[place("kd")]))
     if not np.isfinite(nominal).all():
         joint, name = simulation.number_of(number), simulation.arm.joints[simulation.joints[number]].name
         raise InputError(
