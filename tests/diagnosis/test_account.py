@@ -149,6 +149,9 @@ def test_what_has_no_name_is_a_finding_only_where_it_leads() -> None:
     leading = [part("friction", (0,), 0.6), part("unknown", (1,), 0.3)]
     assert [each.effect for each in without_lesser_unknowns(found, lesser)] == ["coulomb_friction"]
     assert len(without_lesser_unknowns(found, leading)) == 2
+    tiny = part("unknown", (2,), 0.001, joint=2)
+    more = [*found, claim(UNKNOWN.id, 2)]
+    assert [each.joint for each in without_lesser_unknowns(more, [*leading, tiny])] == [1, 1]
 
 
 @pytest.mark.parametrize(("before", "told"), [(1.2, "told"), (1.03, "minor"), (0.99, "none")])

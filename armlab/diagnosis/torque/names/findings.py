@@ -153,9 +153,13 @@ def _is_of_one_place(claim: Claim, joints: int) -> bool:
 
 
 def without_lesser_unknowns(claims: Sequence[Claim], parts: Sequence[Part]) -> tuple[Claim, ...]:
-    """The findings without those that have no name, but where they are a leading cause."""
+    """The findings without those that have no name: where they are a leading cause, those stay that make it one."""
     leads = any(each.cause == UNKNOWN_CAUSE for each in leading_causes(causes_of(parts)))
-    return tuple(each for each in claims if each.effect != UNKNOWN.id or leads)
+    shares = finding_shares(parts, len(claims))
+    unnamed = [share for share, each in zip(shares, claims, strict=True) if each.effect == UNKNOWN.id]
+    least = min(1 - STATED_SHARE, max(unnamed, default=0.0)) if leads else float("inf")
+    kept = (each.effect != UNKNOWN.id or share >= least for share, each in zip(shares, claims, strict=True))
+    return tuple(each for each, keep in zip(claims, kept, strict=True) if keep)
 
 
 def with_minor_ones(claims: Sequence[Claim], parts: Sequence[Part]) -> tuple[Claim, ...]:
