@@ -22,7 +22,7 @@ from armlab.diagnosis.changes.trends import Trend, find_trends, recording_dates
 from armlab.diagnosis.formats import ComparisonStatus
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Settings
-from armlab.diagnosis.torque.diagnose import diagnose
+from armlab.diagnosis.torque.diagnose import diagnose, find_setup
 from armlab.diagnosis.torque.rows.simulation import Simulation, model_baseline, read_simulation
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
@@ -108,6 +108,11 @@ def compare(
     arm = replace(old.arm, unmeasured=without_torque)  # a joint that some recordings have torque of tells a change
     recordings = tuple(replace(each, arm=arm, simulation=old.simulation) for each in (old, new, *more))
     own = baseline or model_baseline(old)
+    progress("reading the recordings rightly")
+    for each in recordings:
+        reason = _reason_misread(each, own)
+        if reason is not None:
+            return Comparison("inconclusive", recordings, read_simulation(recordings[0], own), (), reason=reason)
 
     def diagnose_all() -> list[Diagnosis]:
         diagnoses: list[Diagnosis] = []
@@ -116,6 +121,22 @@ def compare(
         return diagnoses
 
     return compare_with(recordings, diagnose_all, baseline, known_dates, progress)
+
+
+def _reason_misread(recording: Recording, baseline: Baseline) -> str | None:
+    """Why a recording cannot be compared as it is read; None where it can."""
+    settings = Settings()
+    setup = find_setup(recording, baseline, settings, lambda message: None)
+    if setup is None:
+        return None
+    if setup.mistakes:
+        return f"{recording.name}: {setup.sentence} Diagnose it alone, and compare what its corrected/ holds."
+    if setup.share_after > settings.tuning.reading.max_unexplained:
+        return (
+            f"{recording.name}: links and usual friction leave {setup.share_after:.0%} of the variation of the torque, "
+            "however it is read: another robot, or torque that is none?"
+        )
+    return None
 
 
 def compare_with(
