@@ -24,6 +24,7 @@ from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.torque.diagnose import diagnose, find_setup
 from armlab.diagnosis.torque.rows.simulation import Simulation, model_baseline, read_simulation
+from armlab.recordings.plain_least_squares import COMPARED_HZ, fit_plain_rows, prepare_rows
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
 
@@ -34,6 +35,7 @@ OTHER_STATES = (
 )
 SHARED = 0.99  # share of the rows from which on all recordings were in the same states
 FOLLOW_ROUNDS = 3  # in which columns follow what is common beside the changes, before names have to agree
+NOTHING_EXPLAINED = 0.9  # of the scatter of the torque, that plain least squares leaves of noise, or more
 GEOMETRY_TOLERANCE = 1e-6  # rad (m): geometry that counts as that of the same robot
 
 
@@ -125,18 +127,27 @@ def compare(
 
 def _reason_misread(recording: Recording, baseline: Baseline) -> str | None:
     """Why a recording cannot be compared as it is read; None where it can."""
-    settings = Settings()
-    setup = find_setup(recording, baseline, settings, lambda message: None)
-    if setup is None:
-        return None
-    if setup.mistakes:
+    setup = find_setup(recording, baseline, Settings(), lambda message: None)
+    if setup is not None and setup.mistakes:
         return f"{recording.name}: {setup.sentence} Diagnose it alone, and compare what its corrected/ holds."
-    if setup.share_after > settings.tuning.reading.max_unexplained:
-        return (
-            f"{recording.name}: links and usual friction leave {setup.share_after:.0%} of the variation of the torque, "
-            "however it is read: another robot, or torque that is none?"
-        )
+    if baseline != "simulated" and _explains_nothing(recording):
+        return f"{recording.name}: links and friction explain no joint's torque: another robot, or torque that is none?"
     return None
+
+
+def _explains_nothing(recording: Recording) -> bool:
+    """Whether plain least squares leaves nearly all of the torque of every joint to which it is fitted."""
+    rows = [prepare_rows(run, COMPARED_HZ) for run in recording.runs]
+    try:
+        model = fit_plain_rows(recording.arm, rows, COMPARED_HZ)
+    except ValueError:
+        return False
+    moved = [each for each in rows if len(each.torque)]
+    torque = np.concatenate([each.torque for each in moved])
+    left = torque - np.concatenate([model.layout.matrix(each.motion) @ model.values for each in moved])
+    measured = list(recording.arm.measured)
+    left, torque = left[:, measured], torque[:, measured]
+    return bool(np.all(np.std(left, axis=0) > NOTHING_EXPLAINED * np.std(torque, axis=0)))
 
 
 def compare_with(
