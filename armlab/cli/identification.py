@@ -37,7 +37,7 @@ METHODS = (
 )
 @click.option(
     "--tolerance",
-    type=FiniteNumber(min=0, min_open=True),
+    type=FiniteNumber(min=1e-6, max=1e6),
     help="Relative width of a prior about the robot's links.",
 )
 @click.option("--select", "choose", is_flag=True, help="Choose cut-off, components and prior by cross-validation.")

@@ -89,6 +89,8 @@ def untold_names(model: Model) -> list[str]:
 def overfit_warnings(errors: tuple[RunError, ...]) -> Iterator[str]:
     """A line for each joint that held-out runs leave much more of than the runs that were fitted, in percent."""
     fitted, held_out = (_percent_by_joint(errors, role) for role in ROLES)
+    if all(percent > NOTHING_EXPLAINED for percent in (held_out or fitted).values()):
+        yield "warning: the model explains no joint's torque: another robot, or columns that are no torque?"
     for joint, percent in held_out.items():
         known = fitted.get(joint)
         if known and percent > MAX_HELD_OUT_RATIO * known:
@@ -155,6 +157,8 @@ def _parameters(model: Model) -> Table:
     return Table(["parameter", "value", "95 % interval", "unit"], rows, (0, 3), stacked=True)
 
 
+NOTHING_EXPLAINED = 90.0  # percent of the torque, that a model leaves of noise, or more (chosen by eye)
+MIN_PERIODS = 5  # of a cut-off that is given, within the longest run
 MAX_HELD_OUT_RATIO = 2.0  # of the errors on runs that were held out to those that were fitted (chosen by eye)
 NO_VALIDATION_WARNING = (
     "no run validates: these are errors on the identification runs themselves, so they are too small"
@@ -283,6 +287,10 @@ def _build_identifier(recording: Recording, options: IdentifyOptions) -> tuple[I
     pull = Pull("nominal", options.tolerance) if options.tolerance else NO_PULL
     if not options.choose:
         cutoff, how = options.cutoff_hz, list[str]()
+        longest = max(float(np.ptp(run.time)) for run in recording.runs)
+        if cutoff is not None and cutoff * longest < MIN_PERIODS:
+            least = MIN_PERIODS / longest
+            raise InputError(f"--cutoff-hz {cutoff:g}: the longest run lasts {longest:.3g} s, give {least:.2g} or more")
         if cutoff is None:
             cutoff = choose_cutoff_hz(arm, recording.runs_to_identify())
             how = [f"cut-off: {cutoff:.4g} Hz, which predicts best on blocks of the runs that identify"]

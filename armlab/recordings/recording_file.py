@@ -25,6 +25,8 @@ Matrix = tuple[tuple[Bounded, ...], ...]
 Positive = Annotated[float, Gt(0)]
 NotNegative = Annotated[float, Ge(0)]
 PerJoint = Annotated[tuple[Bounded | None, ...], Len(min_length=1)]
+PositivePerJoint = Annotated[tuple[Annotated[float, Gt(0), Le(1e9)] | None, ...], Len(min_length=1)]
+NotNegativePerJoint = Annotated[tuple[Annotated[float, Ge(0), Le(1e9)] | None, ...], Len(min_length=1)]
 
 
 class Columns(Settings):
@@ -96,13 +98,13 @@ class ControllerEntry(Settings):
     """
 
     type: Literal["pd"]
-    kp: PerJoint
-    kd: PerJoint
+    kp: PositivePerJoint
+    kd: NotNegativePerJoint
     ki: PerJoint | None = None
     ki_speed: PerJoint | None = None
     reference_velocity: Literal["zero", "derivative"] = "zero"
     feedforward: Literal["none", "gravity", "model"] = "none"
-    torque_limit: PerJoint | None = None
+    torque_limit: PositivePerJoint | None = None
     limit_slope: Annotated[tuple[NotNegative | None, ...], Len(min_length=1)] | None = None
     integral_limit: PerJoint | None = None
     delay: NotNegative | Annotated[tuple[NotNegative, ...], Len(min_length=1)] = 0.0

@@ -214,5 +214,7 @@ def leave_out(run: AnyRun, stretches: tuple[tuple[float, float], ...]) -> AnyRun
             where = f"{run.time.min():g} s to {run.time.max():g} s"
             raise InputError(f"exclude [{first:g}, {last:g}] of {run.file} holds no row: its time runs from {where}")
         text = f"{inside.sum()} rows from {first:g} s to {last:g} s are left out, as `exclude` says"
+        if inside.all():
+            raise InputError(f"exclude of {run.file} leaves no row: leave the run out of `runs`")
         run = run.rows(~inside).with_findings(Finding("excluded", "note", text))
     return run

@@ -104,7 +104,7 @@ def compare(
     robot, or dates are not as many.
     """
     for other in (new, *more):
-        _check_same_robot(old, other)
+        check_same_robot(old, other)
     known_dates = recording_dates((old, new, *more), dates)
     without_torque = frozenset.intersection(*(each.arm.unmeasured for each in (old, new, *more)))
     arm = replace(old.arm, unmeasured=without_torque)  # a joint that some recordings have torque of tells a change
@@ -313,7 +313,8 @@ def _notes(recordings: Sequence[Recording], baseline: Baseline | None) -> Iterat
         yield "The columns of simulated_position are not used: a comparison of torques takes the measured motion."
 
 
-def _check_same_robot(old: Recording, new: Recording) -> None:
+def check_same_robot(old: Recording, new: Recording) -> None:
+    """Raises InputError for recordings of arms with other joints."""
     pairs = zip(old.arm.joints, new.arm.joints, strict=False)
     alike = len(old.arm) == len(new.arm) and all(
         one.kind == other.kind

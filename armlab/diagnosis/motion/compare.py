@@ -20,16 +20,18 @@ from armlab.common.errors import InputError
 from armlab.diagnosis.changes.numbers import CONFIDENCE, Movement, as_wide_as_runs, half_width_factor
 from armlab.diagnosis.changes.trends import Trend, find_trends, recording_dates
 from armlab.diagnosis.motion.choose import ChosenServo, chance_of_gain, choose_servo
-from armlab.diagnosis.motion.diagnose_motion import reason_unusable
+from armlab.diagnosis.motion.diagnose_motion import NO_SERVO, reason_unusable
 from armlab.diagnosis.motion.estimate import (
     LOGARITHMIC,
     coordinate_scales,
     from_coordinates,
     jacobian,
+    rms_of,
     thin_windows,
     to_coordinates,
     with_damping_inside,
 )
+from armlab.diagnosis.motion.held_out import command_error
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.servo import HIGHEST, LOWEST, PARAMETERS, ServoParameter, place
@@ -233,6 +235,7 @@ def compare_motion(
     ]
     looks = len(PARAMETERS) * len(old.joints)
     changes: list[ServoChange] = []
+    follows = np.zeros((len(recordings), len(old.joints)), dtype=bool)
     for row, own in enumerate(zip(*windows, strict=True)):
         progress(f"comparing joint {row + 1} of {len(old.joints)}")
         same_law = replace(tuning, needed_limits=(), integral_rates=())  # none that one recording alone starts from
@@ -240,6 +243,7 @@ def compare_motion(
             choose_servo(each, simulation.nominal.values[row], looks, same_law)
             for each, simulation in zip(own, simulations, strict=True)
         ]
+        follows[:, row] = [_follows_command(each, fit, tuning) for each, fit in zip(own, fits, strict=True)]
         sound = [
             each.select(np.setdiff1d(np.arange(each.count), fit.odd)).with_integral(fit.fit.integral)
             for each, fit in zip(own, fits, strict=True)
@@ -247,6 +251,9 @@ def compare_motion(
         thinned = [thin_windows(each, tuning.max_judged_windows) for each in sound]
         starts, free = common_start(fits)
         changes += _compare_joint(thinned, starts, free, (simulations[-1].number_of(row), looks), tuning)
+    lost = next((each for each, own in zip(recordings, follows, strict=True) if not own.any()), None)
+    if lost is not None:
+        return replace(none, reason=f"{lost.name}: {NO_SERVO}")
     movements = [each.levels.movement(each.joint) for each in changes if each.changed and more]
     return replace(
         none,
@@ -254,6 +261,12 @@ def compare_motion(
         notes=tuple(_notes(recordings)),
         trends=find_trends(movements, known_dates),
     )
+
+
+def _follows_command(windows: Windows, chosen: ChosenServo, tuning: MotionTuning) -> bool:
+    """Whether a fitted servo tells more of a joint than the command alone, or the mean of the position."""
+    plain = min(rms_of(command_error(windows)), float(np.std(windows.position)))
+    return chosen.fit.rms < max(tuning.max_unexplained * plain, tuning.at_floor * chosen.fit.noise)
 
 
 def common_start(fits: Sequence[ChosenServo]) -> tuple[Array, NDArray[np.bool_]]:

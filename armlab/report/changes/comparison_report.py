@@ -27,7 +27,7 @@ from armlab.common.report.charts import (
 )
 from armlab.common.report.page import Table, render_page
 from armlab.common.report.wording import format_number, format_unit, join_words
-from armlab.diagnosis.changes.comparison import Comparison, compare
+from armlab.diagnosis.changes.comparison import Comparison, check_same_robot, compare
 from armlab.diagnosis.changes.friction_level import ALL_FRICTION
 from armlab.diagnosis.changes.named import ONE_FACTOR, NamedChange
 from armlab.diagnosis.changes.numbers import Change
@@ -493,6 +493,8 @@ def compare_recordings(
     chosen: Baseline | None = next((each for each in get_args(Baseline) if each == baseline), None)
     first, second, *more = (load_recording(each) for each in folders)
     check_output_folder(out, second)
+    for each in (second, *more):
+        check_same_robot(first, each)
     require_identifiable(first, second, *more)
     require_possible(first, second, *more)
     try:
