@@ -94,7 +94,7 @@ def make_verdict(diagnosis: Diagnosis) -> VerdictFile:
         schema=VERDICT_SCHEMA,
         status=diagnosis.status,
         summary=summary_of(diagnosis),
-        story=tuple(_story_entry(each, len(setup)) for each in account.causes),
+        story=tuple(_story_entry(each, len(setup)) for each in account.groups),
         located=tuple(_located_entry(each) for each in diagnosis.located),
         findings=(*setup, *(_finding_entry(*each) for each in zip(diagnosis.claims, shares, strict=True))),
         unexplained=tuple(_unexplained_entry(each) for each in diagnosis.unexplained),

@@ -12,6 +12,7 @@ from armlab.diagnosis.torque.names.findings import (
     causes_of,
     finding_shares,
     leading_causes,
+    minor_causes,
     statement_of,
     told_causes,
 )
@@ -57,13 +58,15 @@ class StatedFinding:
 @dataclass(frozen=True, eq=False)
 class Account:
     """causes: the largest first. told: causes counted by those parts of which a finding is told; leading: those of them
-    that the summary tells. findings: not minor, the largest share first; minor: the others. friction: of each joint
-    with friction among the findings. left: of each joint.
+    that the summary tells. groups: those that are told and, apart from them, what is minor of each cause, by size.
+    findings: not minor, the largest share first; minor: the others. friction: of each joint with friction among the
+    findings. left: of each joint.
     """
 
     causes: tuple[StatedCause, ...] = ()
     told: tuple[StatedCause, ...] = ()
     leading: tuple[StatedCause, ...] = ()
+    groups: tuple[StatedCause, ...] = ()
     findings: tuple[StatedFinding, ...] = ()
     minor: tuple[StatedFinding, ...] = ()
     friction: tuple[JointFriction, ...] = ()
@@ -93,6 +96,7 @@ def account_of(diagnosis: Diagnosis) -> Account:
         causes=causes_of(parts),
         told=told,
         leading=leading_causes(told),
+        groups=tuple(sorted((*told, *minor_causes(parts, claims)), key=lambda each: -each.share)),
         findings=tuple(each for each in every if not each.claim.minor),
         minor=tuple(each for each in every if each.claim.minor),
         friction=tuple(each for each in diagnosis.friction if each.joint in rubbing),

@@ -105,6 +105,11 @@ def told_causes(parts: Sequence[Part], claims: Sequence[Claim]) -> tuple[StatedC
     return causes_of([each for each in parts if not all(claims[number].minor for number in each.claims)])
 
 
+def minor_causes(parts: Sequence[Part], claims: Sequence[Claim]) -> tuple[StatedCause, ...]:
+    """The causes, counted by those parts of the model of which no finding is told."""
+    return causes_of([each for each in parts if all(claims[number].minor for number in each.claims)])
+
+
 def leading_causes(causes: Sequence[StatedCause]) -> tuple[StatedCause, ...]:
     """The largest causes, until they explain nearly all; what explains less than the rest that may stay open is none.
 
