@@ -22,7 +22,7 @@ from armlab.diagnosis.torque.evidence.added_body import (
     with_possible_bodies,
 )
 from armlab.diagnosis.torque.evidence.evidence import Evidence
-from armlab.diagnosis.torque.evidence.plausibility import _reason_other_mass, reason_link_unknown
+from armlab.diagnosis.torque.evidence.plausibility import _reason_other_mass, reason_link_unknown, reason_no_body
 from armlab.diagnosis.torque.search.fitted_model import fit_background
 from armlab.diagnosis.torque.search.surrogate import Structure
 from armlab.effects.library import library
@@ -130,6 +130,20 @@ def reason_beside(joint: int, size: float, depends_on: tuple[str, ...], link: in
     load = Claim("payload", link, (link,), (), "", evidence, torque, candidate=SolidBody.of_body(ARM, link, BODY))
     left = Structure(joint - 1, 0.9, 1e-9, 0.9, 0.9, size * np.cos(np.linspace(0, 20, 500)), depends_on)
     return reason_link_unknown(load, [left], np.ones(3))
+
+
+def test_a_link_whose_moment_of_inertia_would_surely_be_negative_is_not_told() -> None:
+    nothing: Any = None
+    given = np.zeros(30)
+    given[16] = 0.024  # Izz of link 2, kg m2
+
+    def reason(half: float) -> str | None:
+        change = ParameterValue("Izz", -0.029, (-0.029 - half, -0.029 + half), "kg.m2")
+        return reason_no_body(given, Claim("inertial_parameter_error", 2, (), (change,), "", nothing, nothing))
+
+    assert reason(0.001) == "Izz of the link would be -0.004 kg.m2 at most"
+    assert reason(0.006) is None
+    assert reason_no_body(None, Claim("inertial_parameter_error", 2, (), (), "", nothing, nothing)) is None
 
 
 def test_a_load_is_not_told_beside_structure_that_could_be_half_of_it() -> None:

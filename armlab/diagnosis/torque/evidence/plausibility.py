@@ -24,10 +24,13 @@ from armlab.diagnosis.torque.search.search import FailedTest, Step
 from armlab.diagnosis.torque.search.surrogate import Structure
 from armlab.diagnosis.tuning import PlausibilityTuning
 from armlab.effects.contract import Candidate, Kind, Parameter
+from armlab.effects.library import effect_named
 from armlab.effects.links import SolidBody
 from armlab.effects.parameters import ParameterValue, parameter_values
+from problem.arm import PARAMETER_NAMES
 
 NOT_CLAIMED = "present, not claimed"
+NEVER_NEGATIVE = ("mass", "m", "Ixx", "Iyy", "Izz")
 SMALLEST_TORQUE = 1e-12  # N m; less is rounding
 
 
@@ -95,7 +98,7 @@ def links_that_data_tell(
     size = np.maximum(np.std(noise, axis=0), SMALLEST_TORQUE)
     for claim in claims:
         reason = reason_link_unknown(claim, left, size)
-        reason = reason or _reason_other_mass(model, claim)
+        reason = reason or _reason_other_mass(model, claim) or reason_no_body(model.design.simulation.inertial, claim)
         if reason is None:
             kept.append(claim)
         else:
@@ -142,6 +145,22 @@ def _reason_other_mass(model: FittedModel, claim: Claim) -> str | None:
     if low <= found <= high:
         return None
     return f"found anew beside all that is named its mass is {found:.4g} kg, outside its interval"
+
+
+def reason_no_body(given: Array | None, claim: Claim) -> str | None:
+    """Why a link could not exist with what a claim adds to it: its mass or a moment of inertia is surely below zero.
+
+    given: (10 * joints,) of the links of the simulation, None without one. An interval that reaches zero is no reason:
+    a body with other numbers of the link within their intervals may exist.
+    """
+    if given is None or claim.joint is None or effect_named(claim.effect).where != "link":
+        return None
+    link = dict(zip(PARAMETER_NAMES, given[10 * (claim.joint - 1) : 10 * claim.joint].tolist(), strict=True))
+    for each in claim.parameters:
+        own, ends = link.get("m" if each.name == "mass" else each.name), _interval(each)
+        if each.name in NEVER_NEGATIVE and own is not None and ends is not None and own + ends[1] < 0:
+            return f"{each.name} of the link would be {own + ends[1]:.3g} {each.unit} at most"
+    return None
 
 
 def reason_implausible(
