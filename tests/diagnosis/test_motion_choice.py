@@ -59,6 +59,8 @@ def test_damping_is_told_beside_the_kd_that_is_stated_where_no_other_kd_was_foun
     inside = chosen_servo(nominal, "damping", kd=1.27, damping=0.0)
     assert inside.beside_kd(0.5)[both] == pytest.approx([1.27, 0.0])
     assert chosen_servo(nominal, "kd", kd=0.01, damping=1.26).beside_kd(0.5)[both] == pytest.approx([0.01, 1.26])
+    limited = chosen_servo(numbers(kp=20.0, kd=0.5, limit=3.0), "damping", kd=0.01, damping=1.26)  # another servo
+    assert limited.beside_kd(0.5)[both] == pytest.approx([0.01, 1.26])
     weak = chosen_servo(nominal, "damping", kd=0.0, damping=0.4)  # the joint cannot drive itself
     assert weak.beside_kd(0.5)[both] == pytest.approx([0.0, 0.4])
 

@@ -25,6 +25,8 @@ from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.torque.diagnose import diagnose, find_setup
 from armlab.diagnosis.torque.rows.simulation import Simulation, model_baseline, read_simulation
 from armlab.recordings.plain_least_squares import COMPARED_HZ, fit_plain_rows, prepare_rows
+from armlab.recordings.reading.mistakes import TORQUE
+from armlab.recordings.reading.reading import Mistake
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
 
@@ -35,6 +37,8 @@ OTHER_STATES = (
 )
 SHARED = 0.99  # share of the rows from which on all recordings were in the same states
 FOLLOW_ROUNDS = 3  # in which columns follow what is common beside the changes, before names have to agree
+NAMED_BY_COMPARISONS = ("time_delay", "channel_skew", "encoder_offset", "base_tilt")
+LEAST_UNIT = 10.0  # factor of torque that is another unit, and no change of a drive
 NOTHING_EXPLAINED = 0.9  # of the scatter of the torque, that plain least squares leaves of noise, or more
 GEOMETRY_TOLERANCE = 1e-6  # rad (m): geometry that counts as that of the same robot
 
@@ -128,11 +132,19 @@ def compare(
 def _reason_misread(recording: Recording, baseline: Baseline) -> str | None:
     """Why a recording cannot be compared as it is read; None where it can."""
     setup = find_setup(recording, baseline, Settings(), lambda message: None)
-    if setup is not None and setup.mistakes:
+    if setup is not None and any(_is_no_change(each.mistake) for each in setup.mistakes):
         return f"{recording.name}: {setup.sentence} Diagnose it alone, and compare what its corrected/ holds."
     if baseline != "simulated" and _explains_nothing(recording):
         return f"{recording.name}: links and friction explain no joint's torque: another robot, or torque that is none?"
     return None
+
+
+def _is_no_change(mistake: Mistake) -> bool:
+    """Whether no comparison could name it: a scale of the torque, a delay, a zero and a tilt are changes, too."""
+    if mistake.effect == "unit_error" and mistake.form == TORQUE:
+        factor = mistake.value("factor")
+        return max(factor, 1 / factor) >= LEAST_UNIT
+    return mistake.effect not in NAMED_BY_COMPARISONS
 
 
 def _explains_nothing(recording: Recording) -> bool:

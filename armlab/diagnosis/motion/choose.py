@@ -108,11 +108,13 @@ class ChosenServo:
     def beside_kd(self, stated: float) -> Array:
         """The numbers, (parameters,), with the kd that is stated, where another one was not found, and the same sum.
 
-        This is the servo as findings tell it: the fit may have more of the damping outside the drive.
+        This is the servo as findings tell it: the fit may have more of the damping outside the drive, which is the same
+        where the force of the drive has no limit.
         """
         kd, damping, values = place("kd"), place("damping"), self.fit.values.copy()
         left = float(values[damping] + values[kd] - stated)
-        if kd not in self.gains and not self.has_other_kd and left >= 0:
+        unlimited = values[place("limit")] >= INFINITE_LIMIT
+        if unlimited and kd not in self.gains and not self.has_other_kd and left >= 0:
             values[[kd, damping]] = stated, left
         return values
 
