@@ -76,6 +76,7 @@ REFUSALS = (
     Refusal("column tau2 (torque) holds no number in any row", lambda each: each.assign(tau2=np.nan)),
     Refusal("320 of 1600 rows hold zeros alone", with_zeros),
     Refusal("holds no row: its time runs from 0 s to 7.995 s", settings=run_entry(exclude=[[20.0, 30.0]])),
+    Refusal("leaves no row: leave the run out", settings=run_entry(exclude=[[-1.0, 30.0]])),
     Refusal("single precision counts in steps of 128 s there", in_single_precision),
     Refusal("1600 of 1600 rows hold a value that is not", lambda each: each.assign(t=1e300 * (1 + each["t"]))),
     Refusal("unknown signal: did you mean 'torque'?", settings={"units": {**UNITS, "torqe": "N.m"}}),
