@@ -135,21 +135,22 @@ def _find_limit_violations(run: MotionRun, arm: Arm, joint: int) -> list[Finding
     limits = arm.joints[joint].limits
     low, high = run.position[:, joint].min(), run.position[:, joint].max()
     found, own = [], joint_in_words(arm, joint + 1)
+    length, force = ("rad", "N m") if arm.joints[joint].kind == "revolute" else ("m", "N")
     if not has_usual_position(arm.joints[joint], low, high):
         text = (
-            f"position of {own} runs from {low:.4g} to {high:.4g}, its limits are "
-            f"{limits.position[0]:.4g} and {limits.position[1]:.4g}: another unit, zero or robot?"
+            f"position of {own} runs from {low:.4g} to {high:.4g} {length}, its limits are "
+            f"{limits.position[0]:.4g} and {limits.position[1]:.4g} {length}: another unit, zero or robot?"
         )
         found += _joint_warning("beyond_limits", joint, text)
     fastest = float(np.abs(block_means(np.gradient(run.position[:, [joint]], run.time, axis=0))).max())
     if fastest > LIMIT_TOLERANCE_FACTOR * limits.velocity:
         doubt = ": another unit or clock?" if fastest > FACTOR_OF_UNITS * limits.velocity else ""
-        text = f"{own} moves at {fastest:.4g}, its limit is {limits.velocity:.4g}{doubt}"
+        text = f"{own} moves at {fastest:.4g} {length}/s, its limit is {limits.velocity:.4g} {length}/s{doubt}"
         found += _joint_warning("beyond_limits", joint, text)
     peak = float(np.abs(run.torque[:, joint]).max()) if isinstance(run, Run) else 0.0
     if peak > LIMIT_TOLERANCE_FACTOR * limits.torque:
         doubt = ": another unit?" if peak > FACTOR_OF_UNITS * limits.torque else ""
-        text = f"torque of {own} reaches {peak:.4g}, its limit is {limits.torque:.4g}{doubt}"
+        text = f"torque of {own} reaches {peak:.4g} {force}, its limit is {limits.torque:.4g} {force}{doubt}"
         found += _joint_warning("beyond_limits", joint, text)
     return found
 

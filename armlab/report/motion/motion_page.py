@@ -4,9 +4,9 @@ import numpy as np
 
 from armlab.common.report.charts import FOUND_LOOK, GIVEN_LOOK, MEASURED_LOOK, Chart, Layer, Line, draw_chart, fit_axis
 from armlab.common.report.page import Table, render_page
-from armlab.common.report.wording import format_unit
+from armlab.common.report.wording import format_unit, join_words
 from armlab.diagnosis.motion.export import lines_without_field
-from armlab.diagnosis.motion.motion_result import MotionDiagnosis
+from armlab.diagnosis.motion.motion_result import MotionDiagnosis, ServoFinding
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
 from armlab.effects.library import effect_named
 from armlab.report.account.next_steps import MAX_STEPS
@@ -19,7 +19,7 @@ from armlab.report.motion.motion_words import (
     untold_numbers,
 )
 from armlab.report.motion.stated_numbers import stated_numbers
-from armlab.report.words import format_chance
+from armlab.report.words import format_chance, name_of_effect
 from problem.joint_words import joint_at_start, joint_in_table, joints_in_words
 
 USE = (
@@ -87,15 +87,19 @@ def untold_table(diagnosis: MotionDiagnosis) -> Table:
 
 
 def _next_recordings(diagnosis: MotionDiagnosis) -> list[str]:
-    """Recordings that separate the findings from their rivals, each with the joints of these findings."""
-    steps: dict[str, list[int]] = {}
+    """Recordings that separate the findings from their rivals, each with what it tells and the joints of these."""
+    steps: dict[str, list[ServoFinding]] = {}
     for each in sorted(stated_numbers(diagnosis), key=lambda each: -each.share):
         step = each.finding.parameter.experiment or effect_named(each.finding.effect).experiment
         if each.finding.rivals and not each.minor and step:
-            steps.setdefault(step, []).append(each.finding.joint)
-    arm = diagnosis.simulation.arm
-    places = {step: joints_in_words(arm, sorted(set(joints))) for step, joints in steps.items()}
-    return [f"{step[0].upper()}{step[1:]} ({place})." for step, place in places.items()][:MAX_STEPS]
+            steps.setdefault(step, []).append(each.finding)
+    arm, out = diagnosis.simulation.arm, list[str]()
+    for step, own in steps.items():
+        names = dict.fromkeys(name_of_effect(each) for one in own for each in (one.effect, *one.rivals))
+        first, *others = names
+        place = joints_in_words(arm, sorted({each.joint for each in own}))
+        out.append(f"To tell {first} from {join_words(others, 'or')}: {step} ({place}).")
+    return out[:MAX_STEPS]
 
 
 def _error_table(diagnosis: MotionDiagnosis) -> Table:
