@@ -276,6 +276,9 @@ def payload_lines(loaded: Path, without: Path, setting: PayloadSetting) -> Resul
     yield from (number_line(each) for each in numbers)
     if not (mass_alone or payload.is_there):
         yield "its centre is not determined: the interval of its mass reaches zero"
+    mass = numbers[0]
+    if mass.value < 0:
+        yield "warning: no load weighs less than nothing: are the recordings exchanged, or is torque not of this arm?"
     return load_document(setting.place.link or len(task.structure.arm), numbers)
 
 

@@ -8,6 +8,7 @@ them (`name_changes`), and say what would have been seen (`list_table`).
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
+from itertools import combinations
 
 import numpy as np
 
@@ -315,7 +316,10 @@ def _progress_of(number: int, progress: Callable[[str], None]) -> Callable[[str]
 
 
 def _notes(recordings: Sequence[Recording], baseline: Baseline | None) -> Iterator[str]:
-    """What the recordings hold and the comparison does not use."""
+    """What the recordings hold and the comparison does not use, and those that hold the same rows."""
+    for one, other in combinations(recordings, 2):
+        if _same_rows(one, other):
+            yield f"{one.name} and {other.name} hold the same rows: nothing can differ between them."
     runs = [run for each in recordings for run in each.runs]
     if baseline == "simulated":
         yield "The columns of simulated_torque are the simulation; what they lack in all recordings alike is no change."

@@ -131,7 +131,9 @@ def _prepare(
     safety: SafetyRules | None,
 ) -> tuple[PreparedQuestions, ExcitationProblem]:
     _check_same_joints(arm, recording)
-    if len(loaded_verdict.noise) not in (0, len(arm)) or (not len(loaded_verdict.noise) and recording is None):
+    if not len(loaded_verdict.noise) and recording is None:
+        raise InputError(f"{loaded_verdict.path} tells nothing of the noise, as it is inconclusive: give --recording")
+    if len(loaded_verdict.noise) not in (0, len(arm)):
         raise InputError(
             f"{loaded_verdict.path} tells the noise of {len(loaded_verdict.noise)} joints, {arm.name} has {len(arm)}"
         )

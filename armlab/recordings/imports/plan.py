@@ -189,6 +189,8 @@ def _check_validate(validate: Sequence[Path], sources: Mapping[str, Source]) -> 
     unknown = sorted({str(path) for path in validate} - set(sources))
     if unknown:
         raise InputError(f"--validate {unknown[0]} should be one of the imported files")
+    if sources and len({str(path) for path in validate}) == len(sources):
+        raise InputError("--validate names every imported file: leave one or more to identify")
 
 
 def _check_sources(sources: Mapping[str, Source], columns: Mapping[str, tuple[str, ...]]) -> None:
