@@ -34,13 +34,14 @@ MISSING_PACKAGE = "install"
 @dataclass(frozen=True)
 class Refusal:
     """write: the files, in a folder. says: in the line. options: beside the usual ones. lab: text of a Python file of
-    Isaac Lab that is given as the controller.
+    Isaac Lab that is given as the controller. validates: whether all files do.
     """
 
     write: Callable[[Path], list[Path]]
     says: str
     options: dict[str, Any] = field(default_factory=dict)
     lab: str | None = None
+    validates: bool = False
 
 
 def table(name: str = "log.csv", change: Callable[[pd.DataFrame], pd.DataFrame] = lambda each: each) -> Any:
@@ -181,6 +182,7 @@ REFUSALS = (
     Refusal(table(), "--joints names 'j9', which the robot does not have", {"joints": "j9"}),
     Refusal(same_twice, "is given twice: a run cannot both identify and validate"),
     Refusal(table(), "--validate other.csv should be one of the imported files", {"validate": (Path("other.csv"),)}),
+    Refusal(table(), "--validate names every imported file", validates=True),
     Refusal(two(GOOD, SHORT.assign(q2=np.nan)), "column q2 (position) is empty: it has no number in any row"),
     Refusal(
         two(GOOD.rename(columns={"q1": "q1 [rad]"}), SHORT.rename(columns={"q1": "q1 [deg]"})),
@@ -273,6 +275,8 @@ REFUSALS = (
 def refuse(case: Refusal, folder: Path) -> InputError:
     """The refusal of an input; it has to be one line, and nothing may be written."""
     files, options = case.write(folder), {**OPTIONS, **case.options}
+    if case.validates:
+        options["validate"] = tuple(files)
     if case.lab is not None:
         (folder / "lab.py").write_text(case.lab)
         options["controller"] = str(folder / "lab.py")
