@@ -33,6 +33,7 @@ from armlab.diagnosis.motion.estimate import (
 )
 from armlab.diagnosis.motion.held_out import command_error
 from armlab.diagnosis.motion.joint_replay import joint_errors
+from armlab.diagnosis.motion.motion_result import tells_of_a_servo
 from armlab.diagnosis.motion.motion_tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.servo import HIGHEST, LOWEST, PARAMETERS, ServoParameter, place
 from armlab.diagnosis.motion.servo_simulation import read_servo_simulation
@@ -265,8 +266,8 @@ def compare_motion(
 
 def _follows_command(windows: Windows, chosen: ChosenServo, tuning: MotionTuning) -> bool:
     """Whether a fitted servo tells more of a joint than the command alone, or the mean of the position."""
-    plain = min(rms_of(command_error(windows)), float(np.std(windows.position)))
-    return chosen.fit.rms < max(tuning.max_unexplained * plain, tuning.at_floor * chosen.fit.noise)
+    without = min(rms_of(command_error(windows)), float(np.std(windows.position)))
+    return tells_of_a_servo(chosen.fit.rms, without, chosen.fit.noise, tuning)
 
 
 def common_start(fits: Sequence[ChosenServo]) -> tuple[Array, NDArray[np.bool_]]:

@@ -77,9 +77,12 @@ class ReplayError:
 
     def follows_command(self, tuning: MotionTuning = DEFAULT) -> bool:
         """Whether the replay tells more than the command alone, or the mean of the position."""
-        return self.replay_after < max(
-            tuning.max_unexplained * min(self.command, self.spread), tuning.at_floor * self.floor
-        )
+        return tells_of_a_servo(self.replay_after, min(self.command, self.spread), self.floor, tuning)
+
+
+def tells_of_a_servo(error: float, without: float, floor: float, tuning: MotionTuning) -> bool:
+    """Whether the error of a servo's replay is clearly below that without one, or near the noise; all in rad (m)."""
+    return error < max(tuning.max_unexplained * without, tuning.at_floor * floor)
 
 
 @dataclass(frozen=True, eq=False)
