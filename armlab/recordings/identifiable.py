@@ -4,7 +4,7 @@ It is asked of the recording as it is read, after all repairs, by all who fit or
 """
 
 from collections.abc import Sequence
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -111,6 +111,21 @@ def reason_dead(runs: Sequence[Run], arm: Arm) -> str | None:
                 f"The torque of {words} differs by the factor {factor:.4g} in every row: one column is a multiple of "
                 "the other."
             )
+    return reason_of_motion(runs, arm)
+
+
+def reason_of_motion(runs: Sequence[Run], arm: Arm) -> str | None:
+    """A torque that is a multiple of a position or velocity, which no body needs: another column was named for it."""
+    for joint, other, name in product(arm.measured, range(len(arm)), ("position", "velocity")):
+        if all(name in run.signals for run in runs):
+            pairs = [np.column_stack([run.signals[name][:, other], run.torque[:, joint]]) for run in runs]
+            factor = _factor_of_multiple(pairs)
+            if factor is not None:
+                moved = f"{factor:.4g} times the {name} of {joints_in_words(arm, [other + 1])}"
+                return (
+                    f"The torque of {joints_in_words(arm, [joint + 1])} is {moved} in every row: is the right column "
+                    "named?"
+                )
     return None
 
 

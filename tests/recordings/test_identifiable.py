@@ -49,6 +49,11 @@ def multiple() -> pd.DataFrame:
     return table.assign(tau3=(-0.4 * table["tau2"]).round(8))
 
 
+def of_motion() -> pd.DataFrame:
+    table = frame()
+    return table.assign(tau2=(1000 * table[POSITION[2]]).round(6))
+
+
 def still() -> pd.DataFrame:
     table = frame()
     return table.assign(**{name: table[name].iloc[0] for name in POSITION})
@@ -75,6 +80,7 @@ CASES = {
     constant: "never changes: is the right column named?",
     copied: "The torque of joints 1 and 2 is the same in every row",
     multiple: "The torque of joints 2 and 3 differs by the factor -0.4 in every row",
+    of_motion: "The torque of joint 2 is 1000 times the position of joint 3 in every row",
     still: "No joint moves",
     short: "The runs hold 0.29 s in all: too short to tell physics from chance; record 10 s or more.",
 }

@@ -1,7 +1,7 @@
 """Only what passes every test stays: the weakest effect that fails one leaves, and the rest is searched anew."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.belief import Belief
@@ -165,17 +165,17 @@ def _remove_failing(belief: Belief) -> Belief:
         groups, state = model.solver.groups, model.state
         judge = Judge(model, state)
         tested = _test_in_turn(judge, settings)
-        if isinstance(tested, dict):
+        if tested.leaves is None or tested.failed is None:
             anew = find_body_anew(model)
             if anew is model or found_anew >= settings.tuning.pruning.max_cycles:
-                held = [group for group, each in tested.items() if first_failed_test(each, settings) is not None]
-                present = {group: tested.pop(group) for group in held}
-                return replace(belief, model=model, effects=tested, present=present, banned=banned)
+                effects, present = dict[int, Evidence](), dict[int, Evidence]()
+                for group, each in tested.effects.items():
+                    (effects if first_failed_test(each, settings) is None else present)[group] = each
+                return replace(belief, model=model, effects=effects, present=present, banned=banned)
             model, found_anew = anew, found_anew + 1
             continue
-        weakest, failed = tested
-        gone = _groups_to_remove(judge, weakest)
-        steps = [*model.steps, *(Step.against(model.candidate(group), failed) for group in gone)]
+        gone = _groups_to_remove(judge, tested.leaves)
+        steps = [*model.steps, *(Step.against(model.candidate(group), tested.failed) for group in gone)]
         places = {groups[group].place for group in gone}
         banned |= {number for number, each in enumerate(groups) if each.place in places}
         back = {other for group in gone for other in judge.simpler(group)}
@@ -183,11 +183,20 @@ def _remove_failing(belief: Belief) -> Belief:
         model = replace(model, state=state, steps=tuple(steps))
 
 
-def _test_in_turn(judge: Judge, settings: Settings) -> dict[int, Evidence] | tuple[int, FailedTest]:
-    """The evidence for all effects where none has to leave; else the one that leaves first, and why.
+@dataclass(frozen=True, eq=False)
+class TestsInTurn:
+    """The evidence for effects, by group, up to the first one that has to leave, and why it has to."""
 
-    The weakest special law at a joint is the first, then the weakest of the others: those that are stronger need no
-    test. Usual friction that no law contradicts is held.
+    effects: dict[int, Evidence]
+    leaves: int | None = None
+    failed: FailedTest | None = None
+
+
+def _test_in_turn(judge: Judge, settings: Settings) -> TestsInTurn:
+    """Tests effects in the order in which they would leave: those that are stronger need no test once one leaves.
+
+    The weakest special law at a joint is the first, then the weakest of the others. Usual friction that no law
+    contradicts is held.
     """
     special = [group for group in judge.state.groups if judge.simpler(group)]
     others = sorted(set(judge.state.groups) - set(special), key=lambda group: judge.scores[group])
@@ -202,8 +211,8 @@ def _test_in_turn(judge: Judge, settings: Settings) -> dict[int, Evidence] | tup
                 failed[group] = why
         if failed:
             weakest = min(failed, key=lambda group: effects[group].score)
-            return weakest, failed[weakest]
-    return {group: effects[group] for group in judge.state.groups}
+            return TestsInTurn(effects, weakest, failed[weakest])
+    return TestsInTurn({group: effects[group] for group in judge.state.groups})
 
 
 def _groups_to_remove(judge: Judge, weakest: int) -> set[int]:
