@@ -36,10 +36,19 @@ _PATH = click.Path(path_type=Path)
     metavar="TABLES",
     help="Folder `real/tables` of `armlab proof run --tier real --development SEED`; may be given more than once.",
 )
+@click.option(
+    "--beside",
+    is_flag=True,
+    help="Keep the weights that the diagnosis has, and learn those of numbers that it has none of.",
+)
 @click.option("--out", type=OutputPath(), required=True, help="Folder for calibration.json and calibration.md.")
 @prints_lines
 def calibrate_names(
-    sets: tuple[tuple[Path, Path], ...], motion_sets: tuple[Path, ...], real_sets: tuple[Path, ...], out: Path
+    sets: tuple[tuple[Path, Path], ...],
+    motion_sets: tuple[Path, ...],
+    real_sets: tuple[Path, ...],
+    beside: bool,
+    out: Path,
 ) -> Iterator[str]:
     """Learn the probabilities of names from concealed sets.
 
@@ -47,6 +56,7 @@ def calibrate_names(
     of one together (extra `proof`).
     """
     from armlab.diagnosis.choice import Example
+    from armlab.diagnosis.torque.names.decide import calibrated_weights, sets_of_weights
     from armlab.proof.blind.real.real_names import read_weighed_real
     from armlab.proof.blind.score.weighed_names import read_weighed
     from armlab.proof.blind.servo.servo_score import read_weighed_motion
@@ -64,9 +74,9 @@ def calibrate_names(
         ExampleFinding(each.case, each.tier, Example(each.names, each.right), each.background, recording)
         for each, recording in weighed
     ]
-    found = calibrate(findings)
+    found = calibrate(findings, calibrated_weights) if beside else calibrate(findings)
     yield from calibration_lines(found)
-    for path in write_calibration(found, sources, out):
+    for path in write_calibration(found, sources, out, sets_of_weights() if beside else ()):
         yield f"wrote {path}"
 
 

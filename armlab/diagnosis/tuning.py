@@ -138,15 +138,6 @@ class LinkTuning:
 class SolverTuning:
     """Fits and scores of sets of effects."""
 
-    ridge: float = tuned(
-        1e-9,
-        "added to the normal equations: columns that hold each other do not stop a fit",
-        "of a column's squared length",
-        least=1e-15,
-    )
-    min_unabsorbed_share: float = tuned(
-        1e-6, "a column of which other columns leave less is not seen", "of a column's squared length", least=1e-15
-    )
     crowd_penalty: float = tuned(
         4.0, "what each unusual effect makes the next one dearer: many at once are rare", "log likelihood"
     )
@@ -163,7 +154,6 @@ class SearchTuning:
     max_unusual_effects: int = tuned(
         12, "effects beside usual friction: a start that asks for more has lost its way", "effects"
     )
-    min_score_step: float = tuned(1e-6, "smaller gains of a move are rounding", "log likelihood")
 
 
 @dataclass(frozen=True)

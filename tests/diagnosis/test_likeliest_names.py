@@ -1,6 +1,7 @@
 """Effects that passed take the likeliest names of their findings."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import engine_cases as cases
 import numpy as np
@@ -121,6 +122,32 @@ def test_the_law_that_was_found_is_always_among_its_names(model: FittedModel, ef
     (group,) = held.state.groups
     names = weigh_effect(held, group, Judge(held, held.state).effects(), ())
     assert (effect, 2) in {(each.effect, each.joint) for each in names}
+
+
+@pytest.mark.parametrize(("joint", "speaks"), [(2, "found beside friction"), (3, "found usual")])
+def test_usual_friction_is_expected_only_where_the_simulation_has_none(
+    model: FittedModel, joint: int, speaks: str
+) -> None:
+    """The simulation has friction of joint 2 alone."""
+    friction = SimpleNamespace(is_friction=True, joints=(2,))
+    known = SimpleNamespace(structure=SimpleNamespace(components=(friction,)), effects=())
+    simulation = replace(model.design.simulation, model=known)  # type: ignore[arg-type]
+    places = [(each.candidate.effect, each.candidate.joint) for each in model.solver.groups]
+    group = places.index(("coulomb_friction", joint))
+    held = replace(model, design=replace(model.design, simulation=simulation), state=model.state.plus(group))
+    none = weigh_effect(held, group, Judge(held, held.state).effects(), ())[-1]
+    assert [each for each in ("found usual", "found beside friction") if each in none.numbers] == [speaks]
+
+
+def test_numbers_weigh_once_more_beside_a_simulation_that_was_fitted(model: FittedModel) -> None:
+    held = holding(model, "cable_stiffness")
+    (group,) = held.state.groups
+    fitted = replace(held, design=replace(held.design, simulation=replace(held.design.simulation, is_fitted=True)))
+    without, beside = (weigh_effect(each, group, Judge(each, each.state).effects(), ()) for each in (held, fitted))
+    for one, other in zip(without, beside, strict=True):
+        more = other.numbers.keys() - one.numbers.keys()
+        assert more
+        assert all(other.numbers[key] == one.numbers[key.replace("fitted", "found")] for key in more)
 
 
 def test_a_law_that_predicts_held_out_rows_worse_than_none_is_no_name(model: FittedModel) -> None:

@@ -246,6 +246,17 @@ def test_the_cases_of_a_real_recording_are_left_out_together() -> None:
     assert found.tiers["real"].bins[0].mean > 0.6
 
 
+def test_known_weights_stay_and_new_numbers_are_learnt_beside_them() -> None:
+    """What is known says that a name with `a` is right; where `b` stands beside it, it is not."""
+    alone, beside = ({"a": 1.0}, {}), ({"a": 1.0, "b": 1.0}, {})
+    findings = [ExampleFinding(str(number), "clean", Example(alone, (True, False)), False) for number in range(20)]
+    findings += [ExampleFinding(f"b{number}", "clean", Example(beside, (False, True)), False) for number in range(20)]
+    found = calibrate(findings, lambda recording: Weights({"a": 2.0}, 0.02)).weights
+    assert found.numbers["a"] == pytest.approx(2.0, abs=0.01)
+    assert found.numbers["b"] < -3
+    assert found.lapse == 0.02
+
+
 def test_findings_of_one_recording_cannot_be_left_out() -> None:
     finding = ExampleFinding("1", "real", Example(({"a": 1.0}, {}), (True, False)), False, "emps")
     with pytest.raises(InputError, match="give more"):

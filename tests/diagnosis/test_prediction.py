@@ -13,6 +13,7 @@ from armlab.diagnosis.formats import VerdictFile
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Guards, Settings
 from armlab.diagnosis.torque.columns.columns import Group
+from armlab.diagnosis.torque.columns.solver import ROUNDING
 from armlab.diagnosis.torque.diagnose import diagnose, prepare
 from armlab.diagnosis.torque.predict.found_model import model_found, named_model
 from armlab.diagnosis.torque.predict.prediction import (
@@ -138,7 +139,7 @@ def test_an_offset_is_thought_to_be_as_large_as_beside_the_friction_of_real_join
         (column,), joint = group.columns, group.candidate.rows[0]
         torque = np.sqrt(np.mean(model.design.observed.torque[:, joint] ** 2))
         scale = np.hypot(0.3 * np.sqrt(np.mean(friction[:, joint] ** 2)), 0.01 * torque)
-        prior = (solver.precisions[column] - solver.tuning.ridge) ** -0.5 / moments.lengths[column]
+        prior = (solver.precisions[column] - ROUNDING) ** -0.5 / moments.lengths[column]
         assert prior == pytest.approx(scale, rel=0.1)
 
 

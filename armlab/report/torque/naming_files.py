@@ -13,8 +13,7 @@ from armlab.common.report.wording import format_number
 from armlab.diagnosis.result import Diagnosis, Member, Weighed
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.torque.names.decide import with_probabilities
-from armlab.diagnosis.torque.search.search import FailedTest, Step
-from armlab.diagnosis.tuning import SearchTuning
+from armlab.diagnosis.torque.search.search import SMALLEST_GAIN, FailedTest, Step
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 from armlab.effects.words import at_place
@@ -26,7 +25,6 @@ STEPS_FILE: Final = "steps.json"
 NAMES_SCHEMA: Final = "names/1"
 NAMES_FILE: Final = "names.json"
 SEARCH: Final = "search"  # the stage before the others
-LEAST_GAIN = SearchTuning().min_score_step  # nats, that a search asks of an effect
 
 Place = tuple[str, int | None]
 
@@ -147,7 +145,7 @@ def _answer(diagnosis: Diagnosis, mentioned: list[Step], effect: str, joint: int
         return "not named: no search looks for it there" if not mentioned else "in the model, without a claim"
     if left.objection is not None:
         return f"not named: {left.objection}"
-    if left.gain <= LEAST_GAIN:
+    if left.gain <= SMALLEST_GAIN:
         return "not named: it would not raise the log evidence beside what is named"
     return f"not named: it would raise the log evidence by {format_number(left.gain)}, and did not last in the search"
 

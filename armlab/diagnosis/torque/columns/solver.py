@@ -21,7 +21,8 @@ from armlab.diagnosis.tuning import SolverTuning
 from armlab.effects.contract import Candidate
 
 MAX_OVERSHOOT = 0.1  # of a law of the simulation, by which a finding may take off more than all of it (chosen by eye)
-ROUNDING = 1e-9  # of the squared length of a column
+ROUNDING = 1e-9  # of the squared length of a column: added, so that columns that hold each other stop no fit
+LEAST_UNABSORBED = 1e-6  # of the squared length of a column: where others leave less of it, it is not seen
 MAX_KEPT_FITS = 500  # of a solver: of seven joints each takes 50 kB, and 2 % more are fitted anew than with any more
 
 
@@ -103,7 +104,7 @@ class Solver:
 
     def _precisions(self, scales: Sequence[float]) -> Array:
         """Prior precision of each scaled column, (size,)."""
-        out = np.full(self.moments.size, self.tuning.ridge)
+        out = np.full(self.moments.size, ROUNDING)
         for group, scale in zip(self.groups, scales, strict=True):
             out[group.columns] += 1 / (scale * self.moments.lengths[group.columns]) ** 2
         return out
@@ -131,7 +132,7 @@ class Solver:
         out = np.zeros(len(self.groups), dtype=np.intp)
         for numbers, offered in self._by_width.values():
             values = np.linalg.eigvalsh(self.moments.gram[offered[:, :, None], offered[:, None, :]])
-            least = self.tuning.min_unabsorbed_share * np.maximum(values[:, -1:], 1e-300)
+            least = LEAST_UNABSORBED * np.maximum(values[:, -1:], 1e-300)
             out[numbers] = np.sum(values > least, axis=1)
         return out
 
@@ -192,7 +193,7 @@ class Solver:
     def _linked(self, widths: Widths | None) -> LinkColumns:
         gram, base = self.moments.gram, self.base
         if widths is None or self.prior is None:
-            precision = 10 * self.tuning.ridge
+            precision = 10 * ROUNDING
             return LinkColumns(np.eye(base), gram[:base], gram[:base, :base] + precision * np.eye(base), precision, 0.0)
         if not any(widths):
             return LinkColumns(np.empty((base, 0)), np.empty((0, len(gram))), np.empty((0, 0)), 1.0, 0.0)
@@ -274,7 +275,7 @@ class Solver:
 
         What is absorbed by others counts for nothing.
         """
-        return self._gains(state, but, self.tuning.min_unabsorbed_share)
+        return self._gains(state, but, LEAST_UNABSORBED)
 
     def gains_at_most(self, state: State, but: int | None = None) -> Array:
         """The same, no less than what a fit finds: what is absorbed counts."""

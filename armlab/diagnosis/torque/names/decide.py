@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -32,9 +32,18 @@ def calibrated_weights(left_out: str = "") -> Weights:
 
     left_out: a public recording whose own cases they do not know.
     """
-    content = json.loads(files(__package__).joinpath(CALIBRATION_FILE).read_text(encoding="utf-8"))
+    content = _calibration()
     known = content["left_out"].get(left_out, content["all"])
     return Weights({str(key): float(value) for key, value in known["weights"].items()}, float(known["lapse"]))
+
+
+def sets_of_weights() -> tuple[str, ...]:
+    """The development sets from which the weights are."""
+    return tuple(map(str, _calibration()["sets"]))
+
+
+def _calibration() -> dict[str, Any]:
+    return dict(json.loads(files(__package__).joinpath(CALIBRATION_FILE).read_text(encoding="utf-8")))
 
 
 @cache

@@ -3,9 +3,9 @@
 Every candidate of the library takes the place of the finding in turn, everything else fitted anew. One that predicts
 held-out rows worse than no law in that place, or that needs numbers that no arm has, is no name. What a law lacks of
 the best log evidence, and what it predicts worse than the finding, speaks against a name. That none is right is
-likelier the more structure is left beside the finding, the better a flexible law does in its place, and the more is
-unusual about its joint. It is likelier, too, where the errors of the model are coloured, for they are then more than
-noise, and where a finding explains less of the validation runs.
+likelier the more structure is left beside the finding, and the more is unusual about its joint. It is likelier, too,
+where the errors of the model are coloured, for they are then more than noise, where a finding explains less of the
+validation runs, and beside a simulation that was fitted to recordings of the arm, for it lacks little.
 
 Two kinds of findings are weighed, each with numbers of its own: what passed all tests (`found`), and structure of which
 only a surrogate knows (`structure`).
@@ -21,7 +21,7 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.result import Weighed, WeighedName
 from armlab.diagnosis.torque.columns.blocks import rows_of_fit
 from armlab.diagnosis.torque.columns.links import Widths
-from armlab.diagnosis.torque.columns.solver import Fit, Solver, State
+from armlab.diagnosis.torque.columns.solver import LEAST_UNABSORBED, Fit, Solver, State
 from armlab.diagnosis.torque.evidence.added_body import PlacedBody, payload_groups, place_body
 from armlab.diagnosis.torque.evidence.evidence import Evidence
 from armlab.diagnosis.torque.evidence.plausibility import is_of_no_arm
@@ -37,6 +37,7 @@ from armlab.effects.term import SIGN_SIGMAS
 
 Place = int | None  # a joint or link, from 1; None for the whole robot
 Kind = Literal["found", "structure"]
+OF_FITTED = ("none", "gain", "score", "links off", "link", "deficit", "near deficit", "searched", "growth")
 MOST_COLOUR = 1.0  # of errors, a logarithm; beyond, the rate of samples says more than the arm does
 
 
@@ -68,9 +69,9 @@ def weigh_effect(model: FittedModel, group: int, claimed: Mapping[int, Evidence]
         trials += _bodies(model, without, place_body(model, without), candidate.joints[0])
     others = [each for each in claimed if each != group]
     none = _against_found(model, evidence, candidate.joint, others, left)
-    if candidate.facts.usual:
-        none["found usual"] = 1.0
-    elif candidate.facts.scales_torque:
+    if candidate.facts.usual or candidate.is_friction:
+        none |= _against_expected(model, candidate)
+    if candidate.facts.scales_torque:
         bent = _bent_gain(model, without, group)
     return _weighed("found", trials, none, (candidate.joint, candidate.joints), model, without, model.fit.score + bent)
 
@@ -135,7 +136,18 @@ def _weighed(
         for each in known.values()
     ]
     joint, joints = place
-    return (*names, WeighedName(UNKNOWN.id, joint, joints, none))
+    weighed = (*names, WeighedName(UNKNOWN.id, joint, joints, none))
+    if model.design.simulation.is_fitted:
+        weighed = tuple(replace(each, numbers=_beside_fitted(each.numbers)) for each in weighed)
+    return weighed
+
+
+def _beside_fitted(numbers: Mapping[str, float]) -> dict[str, float]:
+    """The numbers of a name, and those once more that weigh otherwise beside a simulation that was fitted to the arm.
+
+    Such a simulation lacks little: what it leaves is the form of its laws more often than an effect.
+    """
+    return {**numbers, **{f"fitted {key}": numbers[f"found {key}"] for key in OF_FITTED if f"found {key}" in numbers}}
 
 
 def _for_name(kind: Kind, trial: _NameTrial, best: float, score: float, error: Array) -> dict[str, float]:
@@ -177,6 +189,13 @@ def _against_found(
         "found crowd": float(len(unusual)),
         "found links off": float(any(model.state.widths or ())),
     }
+
+
+def _against_expected(model: FittedModel, candidate: Candidate) -> dict[str, float]:
+    """Friction and offsets are at every joint: where the simulation has them, what is found is their form at most."""
+    if candidate.joint in model.design.simulation.joints_without_friction:
+        return {"found usual": 1.0} if candidate.facts.usual else {}
+    return {"found beside friction": 1.0}
 
 
 def _validated(evidence: Evidence) -> float:
@@ -232,7 +251,7 @@ def _log_gains(model: FittedModel, state: State, joint: int, torques: Array) -> 
     lengths, shared = np.sum(laws**2, axis=0), rows.T @ laws
     # what the state absorbs counts for nothing
     alone = lengths - np.einsum("pl,pq,ql->l", shared, fit.inverse, shared)
-    least = model.design.settings.tuning.solver.min_unabsorbed_share * lengths
+    least = LEAST_UNABSORBED * lengths
     return np.asarray((laws.T @ errors) ** 2 / (2 * np.maximum(alone, least) + 1e-300))
 
 

@@ -13,6 +13,8 @@ from armlab.diagnosis.torque.columns.solver import Solver, State
 from armlab.diagnosis.tuning import SearchTuning
 from armlab.effects.contract import Candidate
 
+SMALLEST_GAIN = 1e-6  # nats, of a move: less is rounding
+
 
 def rival_formulas(groups: Sequence[Group], number: int) -> tuple[int, ...]:
     """Numbers of the formulas at a joint that a law of the last resort has to be clearly better than."""
@@ -116,7 +118,7 @@ class Search:
             if not found:
                 continue
             what, other = max(found, key=lambda move: self.solver.fit(move[1]).score)
-            if self.solver.fit(other).score > here + self.tuning.min_score_step:
+            if self.solver.fit(other).score > here + SMALLEST_GAIN:
                 return what, other
         return None
 
@@ -190,7 +192,7 @@ class Search:
         asked = 0
         for group in np.argsort(-gains):
             number = int(group)
-            if gains[number] <= self.tuning.min_score_step or asked >= self.tuning.max_candidates_asked:
+            if gains[number] <= SMALLEST_GAIN or asked >= self.tuning.max_candidates_asked:
                 return None
             if self._may_add(state, number, but):
                 asked += 1
@@ -219,7 +221,7 @@ class Search:
             best.setdefault((candidate.effect, candidate.joint), group)
         for (effect, joint), group in best.items():
             if (effect, joint) not in held:
-                asked = gains[group] > self.tuning.min_score_step
+                asked = gains[group] > SMALLEST_GAIN
                 objection = self.objection(self.with_group(state, group), group) if asked else None
                 yield NotTaken(effect, joint, float(gains[group]), objection)
 
@@ -257,7 +259,7 @@ class Search:
 
     def _may_raise(self, state: State, without: State, whole: State, but: int | None, group: int) -> bool:
         """Whether any group could raise the score of a state enough in the place of one."""
-        least = self.solver.fit(state).score + self.tuning.min_score_step - self.solver.free_fit(without).score
+        least = self.solver.fit(state).score + SMALLEST_GAIN - self.solver.free_fit(without).score
         most = self.solver.gains_at_most(whole, but) + self._given_back(whole, but)
         enough = map(int, np.flatnonzero(most > least))
         return any(self._may_add(without, each, group) for each in enough)

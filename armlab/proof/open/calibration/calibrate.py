@@ -5,7 +5,7 @@ of one real recording are left out together, for they share the arm and what its
 cases that were left out, too.
 """
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -27,6 +27,13 @@ EFFECT_PREFIX, EFFECT_SPREAD, SPREAD = "is ", 0.7, 2.0
 COMPANY, COMPANY_SPREAD = ("found beside", "found crowd", "found structure elsewhere", "structure beside"), 0.3
 NARROWER = (1.0, 0.7, 0.5, 0.35)  # times these spreads: the one is kept that makes cases left out likeliest
 CONFIDENCE = 0.95
+HELD = 1e-3  # of a weight that is known, a standard deviation: it stays as it is
+KnownWeights = Callable[[str], Weights]  # without a real recording, or of all for an empty name
+
+
+def nothing_known(_: str) -> Weights:
+    """No weight is known yet."""
+    return Weights({})
 
 
 @dataclass(frozen=True)
@@ -95,12 +102,13 @@ class LeftOut:
     loss: float
 
 
-def calibrate(findings: Sequence[ExampleFinding]) -> Calibration:
+def calibrate(findings: Sequence[ExampleFinding], known: KnownWeights = nothing_known) -> Calibration:
     """The weights of everything that speaks for a name, and their reliability.
 
+    known: weights that stay, the lapse with them: those of other numbers are learnt beside them.
     Raises InputError where all findings are of one case or recording, so that none can be left out.
     """
-    tried = {narrower: leave_out(findings, narrower) for narrower in NARROWER}
+    tried = {narrower: leave_out(findings, narrower, known) for narrower in NARROWER}
     narrower = min(tried, key=lambda each: tried[each].loss)
     best, tiers = tried[narrower], {}
     for tier in sorted({each.tier for each in findings}):
@@ -108,18 +116,20 @@ def calibrate(findings: Sequence[ExampleFinding]) -> Calibration:
         if own:
             chances = [best.chances[at] for at in own]
             tiers[tier] = judge_reliability(chances, [findings[at].example.right for at in own])
+    held = known("")
     whole = Weights(
-        weights_of([each.example for each in findings], narrower),
-        float(np.mean([each.lapse for each in best.weights.values()])),
+        weights_of([each.example for each in findings], narrower, held),
+        held.lapse if held.numbers else float(np.mean([each.lapse for each in best.weights.values()])),
     )
     left_out = {each.recording: best.weights[each.recording] for each in findings if each.recording}
     return Calibration(whole, dict(sorted(left_out.items())), narrower, len(findings), tiers)
 
 
-def weights_of(examples: Sequence[Example], narrower: float) -> dict[str, float]:
+def weights_of(examples: Sequence[Example], narrower: float, known: Weights) -> dict[str, float]:
     """The likeliest weights near those that were stated before. narrower: times the spreads that were stated."""
-    keys = sorted({key for each in examples for name in each.names for key in name})
-    return fit_weights(examples, dict.fromkeys(keys, 0.0), {key: narrower * stated_spread(key) for key in keys})
+    new = sorted({key for each in examples for name in each.names for key in name} - known.numbers.keys())
+    spreads = dict.fromkeys(known.numbers, HELD) | {key: narrower * stated_spread(key) for key in new}
+    return fit_weights(examples, {**known.numbers, **dict.fromkeys(new, 0.0)}, spreads)
 
 
 def stated_spread(key: str) -> float:
@@ -129,29 +139,32 @@ def stated_spread(key: str) -> float:
     return EFFECT_SPREAD if key.startswith(EFFECT_PREFIX) else SPREAD
 
 
-def leave_out(findings: Sequence[ExampleFinding], narrower: float) -> LeftOut:
+def leave_out(findings: Sequence[ExampleFinding], narrower: float, known: KnownWeights) -> LeftOut:
     """Leaves out each real recording and each fold of simulated cases in turn.
 
-    The lapse of a group is found on the other groups, each by weights that do not know it. narrower: times the spreads.
+    The lapse of a group is found on the other groups, each by weights that do not know it. narrower: times the spreads;
+    known: as for `calibrate`.
     """
     groups = _groups(findings)
     if len(set(groups)) < 2:
         raise InputError("all findings are of one case or one real recording: give more, so that some can be left out")
+    before = {group: known(group if isinstance(group, str) else "") for group in dict.fromkeys(groups)}
     plain = {
         group: Weights(
-            weights_of([each.example for each, own in zip(findings, groups, strict=True) if own != group], narrower)
+            weights_of(
+                [each.example for each, own in zip(findings, groups, strict=True) if own != group], narrower, held
+            )
         )
-        for group in dict.fromkeys(groups)
+        for group, held in before.items()
     }
     chances = [probabilities(each.example.names, plain[group]) for each, group in zip(findings, groups, strict=True)]
     rights = [each.example.right for each in findings]
     new = [at for at, each in enumerate(findings) if not each.background]
     weights = {}
-    for group, known in plain.items():
+    for group, own in plain.items():
         others = [at for at in new if groups[at] != group]
-        weights[group] = Weights(
-            known.numbers, fit_lapse([chances[at] for at in others], [rights[at] for at in others])
-        )
+        found = fit_lapse([chances[at] for at in others], [rights[at] for at in others])
+        weights[group] = Weights(own.numbers, before[group].lapse if before[group].numbers else found)
     judged = tuple(with_lapse(each, weights[group].lapse) for each, group in zip(chances, groups, strict=True))
     loss = -sum(float(np.log(judged[at][np.array(rights[at])].sum())) for at in new if any(rights[at]))
     return LeftOut(weights, judged, loss)

@@ -15,11 +15,14 @@ PAGE_FILE = "calibration.md"
 DIGITS = 4
 
 
-def write_calibration(found: Calibration, sources: Sequence[str], out: Path) -> tuple[Path, ...]:
-    """Writes both files. sources: the sets from which the weights are."""
+def write_calibration(
+    found: Calibration, sources: Sequence[str], out: Path, before: Sequence[str] = ()
+) -> tuple[Path, ...]:
+    """Writes both files. sources: the sets from which the weights are; before: those of weights that were kept."""
+    kept = f" Other weights are kept as they were learnt from these: {'; '.join(before)}." if before else ""
     content = {
         "schema": CALIBRATION_SCHEMA,
-        "sets": list(sources),
+        "sets": [*before, *sources],
         "findings": found.findings,
         "spreads_times": found.narrower,
         "all": _rounded(found.weights),
@@ -27,7 +30,7 @@ def write_calibration(found: Calibration, sources: Sequence[str], out: Path) -> 
     }
     page = markdown_page(
         "Probabilities of names: calibration",
-        f"From {found.findings} findings and candidates of these sets: {'; '.join(sources)}.",
+        f"From {found.findings} findings and candidates of these sets: {'; '.join(sources)}.{kept}",
         "## Reliability",
         "Likeliest answers beyond background, in cases that were left out in turn; of one real recording all together.",
         markdown_table(("tier", "probability", "answers", "mean probability", "right"), list(_rows(found))),
