@@ -22,7 +22,7 @@ from armlab.diagnosis.torque.evidence.unknown import (
 )
 from armlab.diagnosis.torque.location import locate_excess, noise_floor
 from armlab.diagnosis.torque.names.claims import Names, links_claim, make_claims
-from armlab.diagnosis.torque.names.decide import lost_names, named_claims, naming_of
+from armlab.diagnosis.torque.names.decide import lost_names, named_claims, naming_of, with_probabilities
 from armlab.diagnosis.torque.names.findings import stated_findings, with_minor_ones, without_lesser_unknowns
 from armlab.diagnosis.torque.names.weighing import weigh_effect, weigh_link, weigh_structure
 from armlab.diagnosis.torque.predict.fits import identified_model, joint_fits
@@ -60,6 +60,7 @@ from armlab.diagnosis.torque.search.search import Search
 from armlab.diagnosis.torque.search.surrogate import Structure
 from armlab.diagnosis.tuning import UnknownTuning, changed_numbers
 from armlab.effects.contract import UNKNOWN
+from armlab.effects.library import effect_named
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.recording import ROLES, Recording, Role
 
@@ -98,7 +99,7 @@ def conclude(recording: Recording, belief: Belief) -> Diagnosis:
     """The diagnosis of a recording from what is believed in the end."""
     prediction, named = belief.prediction, name_claims(belief)
     assert prediction is not None
-    claims = (*named.claims, *links_in_doubt(named.model, prediction.model, named.claims))
+    claims = (*named.claims, *links_in_doubt(named.model, prediction.model, named.claims, belief.left))
     claims = stated_findings(weigh_claims(prediction.model, claims), named.model.columns.joints)
     found = _assemble(recording, named.model, prediction, claims, named.unknowns, named.remains)
     return replace(found, weighed=named.weighed)
@@ -126,10 +127,13 @@ def _claims_of(
     return told, (*claims, *structures)
 
 
-def links_in_doubt(names: FittedModel, model: FittedModel, claims: Sequence[Claim]) -> Iterator[Claim]:
+def links_in_doubt(
+    names: FittedModel, model: FittedModel, claims: Sequence[Claim], left: Sequence[Structure]
+) -> Iterator[Claim]:
     """That links are off, where no claim says so and the model that predicts holds links that are.
 
-    names: the model of the claims, model: the one that predicts. Links that were given to be fitted are no finding.
+    names: the model of the claims, model: the one that predicts; left: what is left at the joints. Links that were
+    given to be fitted are no finding. That any link is off is as probable as all names of links together.
     """
     widths = model.state.widths
     about_links = any(claim_facts(each).where == "link" for each in claims)
@@ -138,7 +142,11 @@ def links_in_doubt(names: FittedModel, model: FittedModel, claims: Sequence[Clai
         off = [links_claim(names, evidence, link) for link, width in enumerate(widths, 1) if width]
         together = next(part for part in weigh_parts(model, off[:1]) if part.cause == LINKS and part.joint is None)
         if together.removal is not None and not together.removal.is_minor:
-            yield max(weigh_claims(model, off), key=lambda each: each.removal.growth if each.removal else 0.0)
+            most = max(weigh_claims(model, off), key=lambda each: each.removal.growth if each.removal else 0.0)
+            assert most.joint is not None
+            chances = with_probabilities(weigh_link(model, most.joint - 1, evidence, {}, left), model.design.settings)
+            of_links = (chance for each, chance in chances if effect_named(each.effect).where == "link")
+            yield replace(most, probability=sum(of_links))
 
 
 def _assemble(

@@ -155,10 +155,9 @@ def _link_claim(
 
 
 def links_claim(model: FittedModel, evidence: Evidence, link: int) -> Claim:
-    """That links are off, where these data do not tell which: no numbers, and the probability that any is.
+    """That links are off, where these data do not tell which: no numbers.
 
-    evidence: for all of them together; its score is the log of a Bayes factor. model: on whose rows it is predicted.
-    link: the one that is missed most, from 1.
+    evidence: for all of them together. model: on whose rows it is predicted. link: the one that is missed most, from 1.
     """
     torque, own = model.coefficients(model.fit), np.zeros(model.moments.size)
     own[: model.columns.base] = torque[: model.columns.base]
@@ -171,7 +170,6 @@ def links_claim(model: FittedModel, evidence: Evidence, link: int) -> Claim:
         evidence=evidence,
         prediction=model.columns.torque_of(own),
         in_links=True,
-        probability=float(1 / (1 + np.exp(-np.clip(evidence.score, -700, 700)))),
     )
 
 
