@@ -46,8 +46,8 @@ def main(words: Sequence[str]) -> None:
     commands = [diagnosis_of(each, options.as_read) for each in options.diagnose] or [TABLE_3]
     with TemporaryDirectory() as folder, _tree_of(options.commit, Path(folder)) as earlier:
         for tree in (earlier, ROOT):  # so that no round compiles
-            compile_modules(*(tree / each for each in ROOTS if (tree / each).is_dir()))
-        compile_modules(Path(sysconfig.get_path("purelib")))
+            _run(tree, sys.executable, "-m", "compileall", "-q", *(each for each in ROOTS if (tree / each).is_dir()))
+        compile_libraries()
         if options.read:
             commands = []
             for line in compare_reading(options.read, earlier, options.rounds):
@@ -57,9 +57,9 @@ def main(words: Sequence[str]) -> None:
                 print(line, flush=True)
 
 
-def compile_modules(*folders: Path) -> None:
-    """Compiles all modules in folders, whatever else asks for; a library may hold some that this Python cannot."""
-    measure_run([sys.executable, "-m", "compileall", "-q", *map(str, folders)], ROOT)
+def compile_libraries() -> None:
+    """Compiles the libraries of this environment; some hold modules of other versions of Python, which fail."""
+    measure_run([sys.executable, "-m", "compileall", "-q", sysconfig.get_path("purelib")], ROOT)
 
 
 def parse_options(words: Sequence[str]) -> argparse.Namespace:

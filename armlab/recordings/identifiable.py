@@ -111,10 +111,10 @@ def reason_dead(runs: Sequence[Run], arm: Arm) -> str | None:
                 f"The torque of {words} differs by the factor {factor:.4g} in every row: one column is a multiple of "
                 "the other."
             )
-    return reason_of_motion(runs, arm)
+    return reason_motion_column(runs, arm)
 
 
-def reason_of_motion(runs: Sequence[Run], arm: Arm) -> str | None:
+def reason_motion_column(runs: Sequence[Run], arm: Arm) -> str | None:
     """A torque that is a multiple of a position or velocity, which no body needs: another column was named for it."""
     for joint, other, name in product(arm.measured, range(len(arm)), ("position", "velocity")):
         if all(name in run.signals for run in runs):

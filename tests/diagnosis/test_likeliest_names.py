@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import engine_cases as cases
 import numpy as np
@@ -130,8 +131,8 @@ def test_usual_friction_is_expected_only_where_the_simulation_has_none(
 ) -> None:
     """The simulation has friction of joint 2 alone."""
     friction = SimpleNamespace(is_friction=True, joints=(2,))
-    known = SimpleNamespace(structure=SimpleNamespace(components=(friction,)), effects=())
-    simulation = replace(model.design.simulation, model=known)  # type: ignore[arg-type]
+    known: Any = SimpleNamespace(structure=SimpleNamespace(components=(friction,)), effects=())
+    simulation = replace(model.design.simulation, model=known)
     places = [(each.candidate.effect, each.candidate.joint) for each in model.solver.groups]
     group = places.index(("coulomb_friction", joint))
     held = replace(model, design=replace(model.design, simulation=simulation), state=model.state.plus(group))

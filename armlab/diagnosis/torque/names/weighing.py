@@ -37,7 +37,8 @@ from armlab.effects.term import SIGN_SIGMAS
 
 Place = int | None  # a joint or link, from 1; None for the whole robot
 Kind = Literal["found", "structure"]
-OF_FITTED = ("none", "gain", "score", "links off", "link", "deficit", "near deficit", "searched", "growth")
+# the numbers that weigh otherwise beside a simulation that was fitted to recordings of the arm
+BESIDE_FITTED = ("none", "gain", "score", "links off", "link", "deficit", "near deficit", "searched", "growth")
 MOST_COLOUR = 1.0  # of errors, a logarithm; beyond, the rate of samples says more than the arm does
 
 
@@ -147,7 +148,10 @@ def _beside_fitted(numbers: Mapping[str, float]) -> dict[str, float]:
 
     Such a simulation lacks little: what it leaves is the form of its laws more often than an effect.
     """
-    return {**numbers, **{f"fitted {key}": numbers[f"found {key}"] for key in OF_FITTED if f"found {key}" in numbers}}
+    return {
+        **numbers,
+        **{f"fitted {key}": numbers[f"found {key}"] for key in BESIDE_FITTED if f"found {key}" in numbers},
+    }
 
 
 def _for_name(kind: Kind, trial: _NameTrial, best: float, score: float, error: Array) -> dict[str, float]:
