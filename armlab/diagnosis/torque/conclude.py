@@ -144,7 +144,9 @@ def links_in_doubt(
         if together.removal is not None and not together.removal.is_minor:
             most = max(weigh_claims(model, off), key=lambda each: each.removal.growth if each.removal else 0.0)
             assert most.joint is not None
-            chances = with_probabilities(weigh_link(model, most.joint - 1, evidence, {}, left), model.design.settings)
+            beside = [each.group for each in claims if each.group is not None]
+            weighed = weigh_link(model, most.joint - 1, evidence, beside, left)
+            chances = with_probabilities(weighed, model.design.settings)
             of_links = (chance for each, chance in chances if effect_named(each.effect).where == "link")
             yield replace(most, probability=sum(of_links))
 

@@ -81,7 +81,7 @@ def weigh_link(
     model: FittedModel,
     link: int,
     evidence: Evidence,
-    claimed: Mapping[int, Evidence],
+    claimed: Iterable[int],
     left: Sequence[Structure],
 ) -> Weighed:
     """The names of a link (from 0) that is off. claimed: the effects of the model."""

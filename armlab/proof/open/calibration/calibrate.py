@@ -129,7 +129,8 @@ def weights_of(examples: Sequence[Example], narrower: float, known: Weights) -> 
     """The likeliest weights near those that were stated before. narrower: times the spreads that were stated."""
     new = sorted({key for each in examples for name in each.names for key in name} - known.numbers.keys())
     spreads = dict.fromkeys(known.numbers, HELD) | {key: narrower * stated_spread(key) for key in new}
-    return fit_weights(examples, {**known.numbers, **dict.fromkeys(new, 0.0)}, spreads)
+    found = fit_weights(examples, {**known.numbers, **dict.fromkeys(new, 0.0)}, spreads)
+    return {**found, **known.numbers}
 
 
 def stated_spread(key: str) -> float:
