@@ -48,7 +48,7 @@ def test_a_sure_effect_passes_and_each_failed_test_has_its_value_and_its_bound()
     failing = {
         "significance": (replace(SURE, corrected=0.5), 0.5, tuning.level),
         "held-out gain": (replace(SURE, gain=0.0), 0.0, settings.tuning.surrogate.least_gain),
-        "error of validation runs": (replace(SURE, rms_after=1.5), 0.5, 0.0),
+        "error of validation runs": (replace(SURE, growth_p=1e-6), 1e-6, tuning.level),
     }
     for name, (evidence, value, bound) in failing.items():
         failed = first_failed_test(evidence, settings)

@@ -222,12 +222,13 @@ class HeldOutGain:
     """By how much squared held-out errors fall, a share of what is left of them, and one-sided p-values of that.
 
     p_value asks whether stretches of time profit alike: what a few of them hold may be a fault of theirs. chance asks
-    whether noise would make it.
+    whether noise would make it. growth_p asks as p_value does whether the errors grow.
     """
 
     share: float
     p_value: float
     chance: float
+    growth_p: float
 
 
 def held_out_gain(without: Array, with_it: Array, blocks: NDArray[np.intp]) -> HeldOutGain:
@@ -242,8 +243,8 @@ def held_out_gain(without: Array, with_it: Array, blocks: NDArray[np.intp]) -> H
     carried = np.bincount(blocks, with_it * predicted)[places]
     gain = float(np.sum(better))
     spread = float(np.std(better, ddof=1)) * np.sqrt(len(better)) if len(better) > 2 else 0.0
-    p_value = student_tail(gain / spread, len(better) - 1) if spread > 0 else 1.0
+    p_value, growth_p = (student_tail(each / spread, len(better) - 1) if spread > 0 else 1.0 for each in (gain, -gain))
     noise = 2 * float(np.sqrt(carried @ carried))
     count = float(np.sum(power)) ** 2 / max(float(power @ power), 1e-300)
     chance = student_tail(gain / noise, count) if noise > 0 else 1.0
-    return HeldOutGain(gain / max(float(with_it @ with_it), 1e-300), p_value, chance)
+    return HeldOutGain(gain / max(float(with_it @ with_it), 1e-300), p_value, chance, growth_p)

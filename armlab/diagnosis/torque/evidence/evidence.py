@@ -24,8 +24,6 @@ from armlab.diagnosis.torque.rows.data import rows_in
 from armlab.diagnosis.torque.search.fitted_model import FittedModel, fit_values, split_fit
 from armlab.diagnosis.torque.search.refine import profile_without
 
-SMALLEST_CHANGE = 1e-4  # of a held-out error: less changes nothing that is shown
-
 
 @dataclass(frozen=True, eq=False)
 class StatesCompared:
@@ -122,7 +120,7 @@ class Evidence:
     of validation runs and of identification stretches held out in turn. validation_gain: the share on validation runs.
     rms_before, rms_after: N m, of that joint on validation rows without and with it. score: what it adds to the score
     of the model. objection: of physics. repeatable: False for what happened once, in one stretch of one run: no other
-    data can tell of it. usual: what every arm has.
+    data can tell of it. usual: what every arm has. growth_p: one-sided, of the error on validation runs growing.
     """
 
     joint: int
@@ -137,16 +135,12 @@ class Evidence:
     objection: str | None = None
     repeatable: bool = True
     usual: bool = False
+    growth_p: float = 1.0
 
     @property
     def fall(self) -> float:
         """By what share the RMS on validation rows falls."""
         return 1 - self.rms_after / self.rms_before if self.rms_before > 0 else 0.0
-
-    @property
-    def is_refuted(self) -> bool:
-        """Whether the error on validation rows grows."""
-        return self.fall < -SMALLEST_CHANGE
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,6 +341,7 @@ class Judge:
             before,
             after,
             score,
+            growth_p=validated.growth_p,
         )
 
 

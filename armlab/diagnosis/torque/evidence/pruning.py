@@ -33,9 +33,9 @@ def first_failed_test(evidence: Evidence, settings: Settings) -> FailedTest | No
     if guards.heldout_gain and evidence.gain < least:
         text = f"held-out gain {100 * evidence.gain:.3g} %"
         return FailedTest("held-out gain", text, evidence.gain, least, "surrogate.least_gain")
-    if guards.heldout_gain and evidence.repeatable and evidence.is_refuted:
-        text = f"the error of validation runs grows by {-100 * evidence.fall:.2g} %"
-        return FailedTest("error of validation runs", text, -evidence.fall, 0.0, at_least=False)
+    if guards.heldout_gain and evidence.repeatable and evidence.growth_p < level:
+        text = f"the error of validation runs grows, p = {evidence.growth_p:.2g}"
+        return FailedTest("error of validation runs", text, evidence.growth_p, level, "pruning.level")
     return None
 
 
@@ -165,7 +165,7 @@ def _remove_failing(belief: Belief) -> Belief:
         groups, state = model.solver.groups, model.state
         judge = Judge(model, state)
         tested = _test_in_turn(judge, settings)
-        if tested.leaves is None or tested.failed is None:
+        if tested.failed is None:
             anew = find_body_anew(model)
             if anew is model or found_anew >= settings.tuning.pruning.max_cycles:
                 effects, present = dict[int, Evidence](), dict[int, Evidence]()
@@ -174,8 +174,9 @@ def _remove_failing(belief: Belief) -> Belief:
                 return replace(belief, model=model, effects=effects, present=present, banned=banned)
             model, found_anew = anew, found_anew + 1
             continue
-        gone = _groups_to_remove(judge, tested.leaves)
-        steps = [*model.steps, *(Step.against(model.candidate(group), tested.failed) for group in gone)]
+        weakest, failed = tested.failed
+        gone = _groups_to_remove(judge, weakest)
+        steps = [*model.steps, *(Step.against(model.candidate(group), failed) for group in gone)]
         places = {groups[group].place for group in gone}
         banned |= {number for number, each in enumerate(groups) if each.place in places}
         back = {other for group in gone for other in judge.simpler(group)}
@@ -185,11 +186,10 @@ def _remove_failing(belief: Belief) -> Belief:
 
 @dataclass(frozen=True, eq=False)
 class TestsInTurn:
-    """The evidence for effects, by group, up to the first one that has to leave, and why it has to."""
+    """The evidence for effects, by group, up to the first one that has to leave; failed: that one, and why it has to."""
 
     effects: dict[int, Evidence]
-    leaves: int | None = None
-    failed: FailedTest | None = None
+    failed: tuple[int, FailedTest] | None = None
 
 
 def _test_in_turn(judge: Judge, settings: Settings) -> TestsInTurn:
@@ -211,7 +211,7 @@ def _test_in_turn(judge: Judge, settings: Settings) -> TestsInTurn:
                 failed[group] = why
         if failed:
             weakest = min(failed, key=lambda group: effects[group].score)
-            return TestsInTurn(effects, weakest, failed[weakest])
+            return TestsInTurn(effects, (weakest, failed[weakest]))
     return TestsInTurn({group: effects[group] for group in judge.state.groups})
 
 

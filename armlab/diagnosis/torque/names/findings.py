@@ -10,7 +10,6 @@ from typing import Literal
 
 from armlab.common.told import MAX_CLASS_NAMES, MIN_CAUSE_PROBABILITY, MIN_NAME_PROBABILITY
 from armlab.diagnosis.result import Claim, Member, Part
-from armlab.diagnosis.torque.evidence.evidence import SMALLEST_CHANGE
 from armlab.diagnosis.torque.predict.parts import UNKNOWN_CAUSE, is_in_no_model
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
@@ -19,6 +18,7 @@ FRICTION = "friction"
 STATED_SHARE = 0.95  # of the error: causes are told until they explain as much
 MAX_STATED_CAUSES = 4
 MAX_STATED_OF_JOINT = 2  # findings
+SMALLEST_CHANGE = 1e-4  # of a held-out error: less changes nothing that is shown
 
 Kind = Literal["name", "class", "cause", "nothing"]
 
