@@ -64,6 +64,13 @@ class DataTuning:
     min_moving_share: float = tuned(
         0.1, "a joint with fewer moving rows counts as moving all the time", "of the rows", most=1.0
     )
+    stretch_s: float = tuned(
+        0.5,
+        "length of the stretches of time that are units of chance: longer than what whitening leaves of any tie",
+        "s",
+        least=1e-3,
+    )
+    min_stretches: int = tuned(60, "least number of stretches: shorter where time is short", "stretches", least=2)
     held_out_blocks: int = tuned(
         6, "blocks of time that a run is cut into where no run validates", "blocks a run", least=2
     )
@@ -171,8 +178,6 @@ class RefineTuning:
 class BlockTuning:
     """Stretches of time as the units of chance in identification rows."""
 
-    block_s: float = tuned(0.5, "length of a stretch: longer than what whitening leaves of any tie", "s", least=1e-3)
-    min_blocks: int = tuned(60, "least number of stretches: shorter where time is short", "stretches", least=2)
     folds: int = tuned(5, "parts of the identification stretches that are held out in turn", least=2)
     max_variance_ratio: float = tuned(
         1e5,
@@ -247,14 +252,6 @@ class SurrogateTuning:
         least=-12.0,
         most=12.0,
     )
-    fold_s: float = tuned(
-        2.0,
-        "length of stretches that choose the ridge in turn, and of those whose errors are tied",
-        "s",
-        least=1e-3,
-    )
-    block_s: float = tuned(0.5, "length of the stretches that are compared on held-out data", "s", least=1e-3)
-    min_blocks: int = tuned(12, "least number of these stretches", "stretches", least=3)
     hats: int = tuned(
         8,
         "piecewise linear functions of a variable: twice as many where it matters most, three times of a position, "

@@ -62,12 +62,12 @@ def test_residuals_are_drawn_from_rows_of_the_same_role_and_joints_stay_together
     for segment in observed.of_role("validate"):
         left[segment.start : segment.stop] = 1.0
     left *= 1 + np.arange(observed.rows)[:, None]
-    drawn = _drawn_anew(left, observed, 0.5, np.random.default_rng(3))
+    drawn = _drawn_anew(left, observed, np.random.default_rng(3))
     held_out = np.any(left > 0, axis=1)
     assert np.array_equal(np.any(drawn > 0, axis=1), held_out)
     assert np.all(drawn == drawn[:, :1])
     assert set(drawn[held_out, 0]) <= set(left[held_out, 0])
-    again = _drawn_anew(left, observed, 0.5, np.random.default_rng(3))
+    again = _drawn_anew(left, observed, np.random.default_rng(3))
     assert np.array_equal(drawn, again)
 
 

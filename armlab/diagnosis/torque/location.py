@@ -44,7 +44,7 @@ def locate_excess(residual: Array, floor: Array, observed: Observed, tuning: Tun
     """Joints whose error exceeds the noise. residual: (rows, joints); floor: (joints,), N m, of the noise."""
     power = residual**2 - floor**2
     joints = range(residual.shape[1])
-    excess = np.array([_significant_excess(power[:, joint], observed.rate_hz, tuning) for joint in joints])
+    excess = np.array([_significant_excess(power[:, joint], observed, tuning) for joint in joints])
     total = float(excess.sum())
     if total <= 0:
         return ()
@@ -52,11 +52,11 @@ def locate_excess(residual: Array, floor: Array, observed: Observed, tuning: Tun
     return tuple(_locate_in_joint(joint, excess[joint] / total, power[:, joint], observed, tuning) for joint in order)
 
 
-def _significant_excess(power: Array, rate_hz: float, tuning: Tuning) -> float:
+def _significant_excess(power: Array, observed: Observed, tuning: Tuning) -> float:
     """Mean excess power, zero where it may be chance: tested between stretches of time, errors being tied."""
-    stretches = max(int(len(power) / rate_hz / tuning.surrogate.fold_s), tuning.surrogate.min_blocks)
-    means = np.array([part.mean() for part in np.array_split(power, stretches)])
-    error = float(np.std(means, ddof=1) / np.sqrt(stretches))
+    numbers = observed.long_stretches
+    means = np.bincount(numbers, power) / np.bincount(numbers)
+    error = float(np.std(means, ddof=1) / np.sqrt(len(means)))
     mean = float(power.mean())
     return mean if mean > tuning.location.min_significance * error * np.sqrt(np.log(len(means) + 1)) else 0.0
 

@@ -17,7 +17,6 @@ from joblib import Parallel, delayed
 from armlab.common.arrays import Array
 from armlab.diagnosis.result import Claim, Diagnosis, Survival
 from armlab.diagnosis.torque.belief import Belief
-from armlab.diagnosis.torque.columns.blocks import block_numbers
 from armlab.diagnosis.torque.columns.design import DesignMatrix
 from armlab.diagnosis.torque.conclude import name_claims
 from armlab.diagnosis.torque.rows.data import Observed
@@ -70,14 +69,14 @@ def _simulations(
         rng = np.random.default_rng([seed, number])
         gone = rng.permutation(len(named))[: (len(named) + 1) // 2] if number >= repetitions else ()
         torque = sum((named[each].prediction for each in gone), np.zeros_like(left))
-        drawn = _drawn_anew(left, design.observed, model.design.settings.tuning.surrogate.fold_s, rng)
+        drawn = _drawn_anew(left, design.observed, rng)
         without = frozenset((named[each].effect, named[each].joint) for each in gone)
         yield _Simulated(design.target - left - torque + drawn, without)
 
 
-def _drawn_anew(left: Array, observed: Observed, block_s: float, rng: np.random.Generator) -> Array:
+def _drawn_anew(left: Array, observed: Observed, rng: np.random.Generator) -> Array:
     """What a model leaves (rows, joints), stretch by stretch from a stretch of the same role that begins anywhere."""
-    out, numbers = np.empty_like(left), block_numbers(observed, block_s, 1)
+    out, numbers = np.empty_like(left), observed.long_stretches
     for number in np.unique(numbers):
         rows = np.flatnonzero(numbers == number)
         own = next(each for each in observed.segments if each.start <= rows[0] < each.stop)

@@ -15,8 +15,6 @@ from armlab.diagnosis.torque.columns.inverses import pseudo_inverse_of
 from armlab.diagnosis.torque.columns.solver import Fit
 from armlab.diagnosis.torque.rows.data import Observed
 from armlab.diagnosis.torque.rows.noise import Noise
-from armlab.diagnosis.tuning import BlockTuning
-from armlab.recordings.recording import ROLES
 
 ROUNDING = 1e-14  # of the largest variance: rounding
 
@@ -70,17 +68,15 @@ def whitened_rows(
     lengths: Array,
     noise: Noise,
     observed: Observed,
-    tuning: BlockTuning,
 ) -> WhitenedRows:
     """Design and errors of a fit: links, effects in their order, then the extra columns (rows, count) by joint."""
     designs, errors, blocks = [], [], []
-    stretches = block_numbers(observed, tuning.block_s, tuning.min_blocks)
     for joint in range(columns.joints):
         own, left = rows_of_fit(columns, fit, lengths, joint)
         design = np.column_stack([own, *([extra[joint]] if joint in extra else [])])
         designs.append(noise.white(design, joint, observed, "identify"))
         errors.append(noise.white(left[:, None], joint, observed, "identify")[:, 0])
-        blocks.append(noise.numbers(stretches, joint, observed, "identify"))
+        blocks.append(noise.numbers(observed.stretches, joint, observed, "identify"))
     return WhitenedRows(tuple(designs), tuple(errors), tuple(blocks))
 
 
@@ -99,22 +95,6 @@ def rows_of_fit(columns: Columns, fit: Fit, lengths: Array, joint: int) -> tuple
     design[:, :rank] = rigid @ fit.links[index[loading]]
     design[:, [at[int(column)] for column in index[chosen]]] = effects
     return design, left
-
-
-def block_numbers(observed: Observed, length_s: float, least: int) -> NDArray[np.intp]:
-    """Number of the stretch of time of each row, (rows,); none reaches over the end of a segment.
-
-    Stretches are shorter in a short recording, so that each role has some `least` of them.
-    """
-    numbers, start = np.empty(observed.rows, dtype=np.intp), 0
-    rows = {role: sum(each.stop - each.start for each in observed.of_role(role)) for role in ROLES}
-    for each in observed.segments:
-        count = each.stop - each.start
-        length = min(length_s, rows[each.role] / observed.rate_hz / least)
-        blocks = max(int(count / observed.rate_hz / length), 1)
-        numbers[each.start : each.stop] = start + np.arange(count) * blocks // count
-        start += blocks
-    return numbers
 
 
 def block_covariance(

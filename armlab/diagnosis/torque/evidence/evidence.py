@@ -13,7 +13,6 @@ from armlab.diagnosis.torque.columns.blocks import (
     HeldOutGain,
     WhitenedRows,
     block_covariance,
-    block_numbers,
     held_out_gain,
     variance_inflation,
 )
@@ -101,9 +100,7 @@ class StatesCompared:
         observed, noise = self.model.design.observed, self.model.noise
         left = np.column_stack([self.model.residual_at(joint, each) for each in (less, fit)])
         white = noise.white(left, joint, observed, "validate")
-        tuning = self.model.design.settings.tuning.surrogate
-        stretches = block_numbers(observed, tuning.block_s, tuning.min_blocks)
-        blocks = noise.numbers(stretches, joint, observed, "validate")
+        blocks = noise.numbers(observed.stretches, joint, observed, "validate")
         return held_out_gain(white[:, 0], white[:, 1], blocks)
 
     def validation_rms(self, fit: Fit, joint: int) -> float:

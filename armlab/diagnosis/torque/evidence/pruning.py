@@ -186,7 +186,7 @@ def _remove_failing(belief: Belief) -> Belief:
 
 @dataclass(frozen=True, eq=False)
 class TestsInTurn:
-    """The evidence for effects, by group, up to the first one that has to leave; failed: that one, and why it has to."""
+    """The evidence for effects, by group, up to the first one that has to leave; failed: that one, and why."""
 
     effects: dict[int, Evidence]
     failed: tuple[int, FailedTest] | None = None

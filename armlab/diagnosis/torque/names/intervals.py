@@ -71,7 +71,7 @@ def extend_with_shapes(model: FittedModel) -> ShapedFit:
         bounds += candidate.bounds
         start += count
     settings, lengths = design.settings, model.moments.lengths
-    rows = whitened_rows(model.columns, extra, fit, lengths, model.noise, design.observed, settings.tuning.blocks)
+    rows = whitened_rows(model.columns, extra, fit, lengths, model.noise, design.observed)
     own = np.sum([np.sum(design[:, len(fit.inverse) :] ** 2, axis=0) for design in rows.designs], axis=0)
     anywhere = np.array([12 / (high - low) ** 2 for low, high in bounds])  # of a number anywhere in its bounds
     shapes = np.sqrt(own + anywhere)

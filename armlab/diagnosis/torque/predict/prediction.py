@@ -226,8 +226,8 @@ class _Trial:
         model = fit_with_prior(design, noise, state.widths)
         everything = model.solver.fit(State(tuple(range(len(model.solver.groups))), state.widths))
         unit, lengths = _unit_noise(judge.observed), model.moments.lengths
-        rows = whitened_rows(design.columns, {}, everything, lengths, noise, observed, tuning.blocks)
-        raw = whitened_rows(judge.columns, {}, everything, lengths, unit, judge.observed, tuning.blocks)
+        rows = whitened_rows(design.columns, {}, everything, lengths, noise, observed)
+        raw = whitened_rows(judge.columns, {}, everything, lengths, unit, judge.observed)
         values, joints = fit_values(everything), range(observed.joints)
         own, judged = judge.blocks(observed), judge.blocks(judge.observed)
         return cls(

@@ -20,6 +20,8 @@ from problem.joint_words import joint_in_words
 from problem.motion import Motion
 from problem.regressor import inertia_column
 
+LONG_STRETCH = 4  # stretches
+
 
 @dataclass(frozen=True, eq=False)
 class Segment:
@@ -131,7 +133,7 @@ class Observed:
     it further: in those the noise of the encoders would explain itself.
     rate_hz: of the kept rows. held_out_blocks: whether blocks of time had to stand in for validation runs. moving:
     (rows, joints), False where a joint stands still: friction at rest takes any value, and no law of motion holds.
-    min_segment_rows: shorter stretches in motion are not used.
+    min_segment_rows: shorter stretches in motion are not used. stretch_s, min_stretches: see `stretches`.
     """
 
     signals: tuple[Signals, ...]
@@ -141,6 +143,8 @@ class Observed:
     held_out_blocks: bool
     moving: NDArray[np.bool_]
     min_segment_rows: int
+    stretch_s: float
+    min_stretches: int
 
     @property
     def joints(self) -> int:
@@ -180,6 +184,30 @@ class Observed:
     def cutoff_hz(self) -> float:
         """Of the filter that torque and columns share."""
         return self.signals[0].filter.cutoff_hz
+
+    @cached_property
+    def stretches(self) -> NDArray[np.intp]:
+        """Number of the stretch of time of each row, (rows,): the units of chance; none reaches over a segment's end.
+
+        Stretches are shorter in a short recording, so that each role has some of them.
+        """
+        return self._number_stretches(1)
+
+    @cached_property
+    def long_stretches(self) -> NDArray[np.intp]:
+        """The same of longer stretches, which hold what errors that are not whitened tie together, (rows,)."""
+        return self._number_stretches(LONG_STRETCH)
+
+    def _number_stretches(self, times: int) -> NDArray[np.intp]:
+        numbers, start = np.empty(self.rows, dtype=np.intp), 0
+        rows = {role: sum(each.stop - each.start for each in self.of_role(role)) for role in ROLES}
+        for each in self.segments:
+            count = each.stop - each.start
+            length = times * min(self.stretch_s, rows[each.role] / self.rate_hz / self.min_stretches)
+            blocks = max(int(count / self.rate_hz / length), 1)
+            numbers[each.start : each.stop] = start + np.arange(count) * blocks // count
+            start += blocks
+        return numbers
 
     def of_role(self, role: Role, joint: int | None = None) -> tuple[Segment, ...]:
         """The segments of a role; only the parts in which a joint (from 0) moves, if one is given."""
@@ -266,7 +294,8 @@ def _with_segments(
     blocks = not any(each.run.role == "validate" and len(each.torque) >= least for each in signals)
     segments = _split_runs(signals, blocks, tuning)
     moving = moving_rows(signals, segments, cutoff_hz, tuning)
-    return Observed(signals, calm, segments, rate_hz, blocks, moving, least)
+    stretches = tuning.stretch_s, tuning.min_stretches
+    return Observed(signals, calm, segments, rate_hz, blocks, moving, least, *stretches)
 
 
 def in_fixed_order(runs: Sequence[Run]) -> list[Run]:

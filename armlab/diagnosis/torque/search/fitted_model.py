@@ -101,7 +101,7 @@ def fit_background(design: DesignMatrix, families: Sequence[Family], seed: int, 
     tuning = design.settings.tuning.surrogate
     observed, joints = moved.observed, range(moved.observed.joints)
     flexible = [flexible_features(observed, joint, rng, tuning) for joint in joints]
-    made = tuple(fold_features(each, observed, joint, tuning) for joint, each in enumerate(flexible))
+    made = tuple(fold_features(each, observed, joint) for joint, each in enumerate(flexible))
     banks = motion_banks(observed, tuning)
     offered = moved.with_candidates(families, _split_by_run(moved, left))
     whole = replace(offered, features=made, banks=banks, offsets=_offset_scales(first))
@@ -227,9 +227,9 @@ def whitening_losses(model: FittedModel, coloured: Noise, white: Noise) -> Array
 
 def split_fit(model: FittedModel, fit: Fit, noise: Noise) -> Folds:
     """The rows of a fit under some noise, in folds."""
-    tuning = model.design.settings.tuning.blocks
-    rows = whitened_rows(model.columns, {}, fit, model.moments.lengths, noise, model.design.observed, tuning)
-    return split_folds(rows, fit_values(fit), prior_precision(model.solver, fit, len(fit.inverse)), tuning.folds)
+    folds = model.design.settings.tuning.blocks.folds
+    rows = whitened_rows(model.columns, {}, fit, model.moments.lengths, noise, model.design.observed)
+    return split_folds(rows, fit_values(fit), prior_precision(model.solver, fit, len(fit.inverse)), folds)
 
 
 def fit_values(fit: Fit) -> Array:

@@ -60,8 +60,7 @@ def refine_shapes(
 def profile_without(design: DesignMatrix, noise: Noise, solver: Solver, rest: State) -> Profile:
     """What a state leaves to an effect that is not in it."""
     fit, columns = solver.fit(rest), design.columns
-    blocks = design.settings.tuning.blocks
-    rows = whitened_rows(columns, {}, fit, solver.moments.lengths, noise, design.observed, blocks)
+    rows = whitened_rows(columns, {}, fit, solver.moments.lengths, noise, design.observed)
     joints = range(columns.joints)
     return Profile(
         dict(zip(joints, rows.designs, strict=True)), dict(zip(joints, rows.errors, strict=True)), fit.inverse

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.torque.columns.blocks import HeldOutGain, block_numbers, held_out_gain
+from armlab.diagnosis.torque.columns.blocks import HeldOutGain, held_out_gain
 from armlab.diagnosis.torque.columns.inverses import solve_positive
 from armlab.diagnosis.torque.rows.data import Observed, Segment, rows_in
 from armlab.diagnosis.torque.rows.features import Features, Grams
@@ -20,10 +20,10 @@ from armlab.diagnosis.tuning import SurrogateTuning
 Sums = tuple[tuple[Array, ...], tuple[Array, ...]]  # Gram matrices and products with the target, of each third
 
 
-def time_thirds(observed: Observed, joint: int, tuning: SurrogateTuning) -> NDArray[np.intp]:
+def time_thirds(observed: Observed, joint: int) -> NDArray[np.intp]:
     """Stretches of time of the identification rows, in turn; -1 elsewhere."""
     learn = rows_in(observed.of_role("identify", joint), observed.rows)
-    return np.where(learn, block_numbers(observed, tuning.fold_s, tuning.min_blocks) % 3, -1)
+    return np.where(learn, observed.long_stretches % 3, -1)
 
 
 def _grams(white: Array, thirds: Sequence[NDArray[np.bool_]]) -> tuple[Array, ...]:
@@ -37,10 +37,9 @@ def predict_in_turn(
     ridge: float,
     grams: tuple[Array, ...],
     products: tuple[Array, ...],
-    tuning: SurrogateTuning,
 ) -> Array:
     """Predictions of the chosen rows, each from the thirds that it does not belong to."""
-    thirds = block_numbers(observed, tuning.fold_s, tuning.min_blocks)[rows] % 3
+    thirds = observed.long_stretches[rows] % 3
     out = np.empty(len(thirds))
     for fold in range(3):
         gram = np.sum(grams, axis=0) - grams[fold] + ridge * np.eye(values.shape[1])
@@ -73,9 +72,9 @@ class FoldedFeatures:
     grams: Grams
 
 
-def fold_features(made: Features, observed: Observed, joint: int, tuning: SurrogateTuning) -> FoldedFeatures:
+def fold_features(made: Features, observed: Observed, joint: int) -> FoldedFeatures:
     """Features of a joint (from 0), with their products third by third."""
-    thirds = time_thirds(observed, joint, tuning)
+    thirds = time_thirds(observed, joint)
     parts = (made.values[thirds == fold] for fold in range(3))
     grams = Grams(tuple(part.T @ part for part in parts), asked_often=True)
     return FoldedFeatures(replace(made, grams=grams), thirds, grams)
@@ -108,7 +107,7 @@ def predict_structure(
     ridge, weights = made.grams.best_ridge(products, tuning.ridge_exponents)
     predicted, *in_turn = (values @ np.column_stack([weights, made.grams.weights_in_turn(products, ridge)])).T
     rows = rows_in(observed.of_role("validate", joint), observed.rows)
-    numbers, learn = block_numbers(observed, tuning.block_s, tuning.min_blocks), folds >= 0
+    numbers, learn = observed.stretches, folds >= 0
     validated = held_out_gain(residual[rows], residual[rows] - predicted[rows], numbers[rows])
     turned = residual[learn] - np.choose(folds[learn], [each[learn] for each in in_turn])
     inside = held_out_gain(residual[learn], turned, numbers[learn])
@@ -151,7 +150,7 @@ class Surrogate:
             prediction = self.left.features.values @ self.weights
         else:
             used = np.ones(observed.rows, dtype=bool)
-            prediction = predict_in_turn(self.left.features.values, used, observed, self.ridge, *self.in_turn, tuning)
+            prediction = predict_in_turn(self.left.features.values, used, observed, self.ridge, *self.in_turn)
         rows = rows_in(observed.of_role("validate", self.joint), observed.rows)
         residual = self.left.residual
         power = float(np.mean(residual[rows] ** 2))
@@ -218,8 +217,8 @@ class _Regression:
         learn, judge = observed.of_role("identify", joint), observed.of_role("validate", joint)
         both = (*learn, *judge)
         lost = noise.lost(joint)
-        numbers = _stretch_numbers(both, lost, block_numbers(observed, tuning.fold_s, tuning.min_blocks))
-        blocks = _stretch_numbers(both, lost, block_numbers(observed, tuning.block_s, tuning.min_blocks))
+        numbers = _stretch_numbers(both, lost, observed.long_stretches)
+        blocks = _stretch_numbers(both, lost, observed.stretches)
         known = np.arange(len(blocks)) < sum(each.stop - each.start - lost for each in learn)
         columns, target = _white(left, joint, noise, both)
         thirds = [known & (numbers % 3 == fold) for fold in range(3)]
