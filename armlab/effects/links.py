@@ -334,12 +334,15 @@ class SolidBody(LinkTerm):
         mass = float(coefficients[0])
         return {"mass": mass, "centre": self.shape[:3], "inertia": tuple(mass * each for each in self.shape[3:])}
 
-    def known(self, coefficients: Array) -> Array:
+    def known(self, coefficients: Array) -> Array | None:
         """That it is a body: the curvature of -log det of its pseudo-inertia, (10, 10), in mass and shape.
 
         The determinant is that of the spread about the centre times a power of the mass, so the centre itself is free:
-        a small body is a narrow one and not one whose place is known.
+        a small body is a narrow one and not one whose place is known. None without a mass, where other columns of a
+        model leave nothing to it.
         """
+        if coefficients[0] == 0:
+            return None
         x, y, z = self.shape[:3]
         to_spread = np.column_stack([-_slopes_of_point(x, y, z), np.eye(6)])
         out = np.zeros((10, 10))

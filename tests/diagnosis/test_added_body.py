@@ -84,6 +84,10 @@ def test_a_body_of_held_form_with_a_negative_mass_is_none() -> None:
     assert held.objection(np.array([-1.0]), np.array([[1.0]])) is None
 
 
+def test_of_a_body_without_mass_nothing_is_known() -> None:
+    assert body_at(0.1, 0.01).known(np.zeros(1)) is None
+
+
 def body_at(x: float, spread: float) -> SolidBody:
     """Two kilograms. spread: second moment in each direction, m2."""
     link = link_from_centre_of_mass(2.0, np.array([x, -0.2, 0.3]), 4 * spread * np.eye(3))
@@ -94,6 +98,7 @@ def body_at(x: float, spread: float) -> SolidBody:
 def test_what_physics_tells_of_a_body_is_its_spread_and_not_its_place(size: float) -> None:
     body = body_at(0.1, size**2)
     information = body.known(np.array([2.0]))
+    assert information is not None
     grown, moved = (
         np.append(0.0, np.subtract(other.shape, body.shape))
         for other in (body_at(0.1, 1.01 * size**2), body_at(0.1 + 0.01 * size, size**2))
