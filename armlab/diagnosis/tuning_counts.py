@@ -17,8 +17,8 @@ DECIDING = tuple(DIAGNOSIS / "torque" / each for each in ("evidence", "names")) 
 class TuningCounts:
     """How many there are of each kind.
 
-    numbers: tuning numbers. deciding: those of them that the code of `DECIDING` reads. by_eye: those whose source is
-    that somebody chose them by eye. constants: see `count_constants`.
+    numbers: tuning numbers. deciding: see `deciding_numbers`. by_eye: those whose source is that somebody chose them by
+    eye. constants: see `count_constants`.
     """
 
     numbers: int
@@ -30,13 +30,18 @@ class TuningCounts:
 def count_tuning() -> TuningCounts:
     """Of the diagnosis and of the reading."""
     numbers = list(tuning_numbers(Tuning()))
-    read = {name for folder in DECIDING for tree in _trees(folder) for name in _attributes(tree)}
     return TuningCounts(
         len(numbers),
-        sum(read.issuperset(each.name.split(".")) for each in numbers),
+        len(deciding_numbers()),
         sum(each.source == BY_EYE for each in numbers),
         sum(count_constants(tree) for folder in (DIAGNOSIS, READING) for tree in _trees(folder)),
     )
+
+
+def deciding_numbers() -> list[str]:
+    """The tuning numbers that the code of `DECIDING` reads."""
+    read = {name for folder in DECIDING for tree in _trees(folder) for name in _attributes(tree)}
+    return [each.name for each in tuning_numbers(Tuning()) if read.issuperset(each.name.split("."))]
 
 
 def count_constants(tree: ast.Module) -> int:

@@ -15,7 +15,7 @@ from armlab.common.errors import InputError
 from armlab.diagnosis.settings import Settings, vary
 from armlab.diagnosis.torque.diagnose import diagnose
 from armlab.diagnosis.tuning import Tuning, changed_numbers, parse_change, tuning_numbers, tuning_page
-from armlab.diagnosis.tuning_counts import count_constants, count_tuning
+from armlab.diagnosis.tuning_counts import count_constants, count_tuning, deciding_numbers
 from armlab.report.verdict_files import verdict_texts
 
 ROOT = Path(__file__).parents[2]
@@ -46,6 +46,13 @@ def test_the_counts_hold_each_number_once() -> None:
     counts = count_tuning()
     assert counts.numbers == len(list(tuning_numbers(Tuning())))
     assert 0 < counts.deciding < counts.by_eye < counts.numbers
+
+
+def test_the_sentences_of_how_a_name_is_claimed_hold_every_number_that_decides() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "diagnosis.md").read_text(encoding="utf-8")
+    sentences = page.split("**In ten sentences**")[1].split("\n\n`armlab")[0]
+    named = set(re.findall(r"`([a-z]+\.[a-z_]+)`", sentences))
+    assert named == set(deciding_numbers())
 
 
 def test_another_value_changes_one_number_and_nothing_else() -> None:

@@ -191,19 +191,19 @@ class Observed:
 
         Stretches are shorter in a short recording, so that each role has some of them.
         """
-        return self._number_stretches(1)
+        return self._number_stretches(self.stretch_s)
 
     @cached_property
     def long_stretches(self) -> NDArray[np.intp]:
         """The same of longer stretches, which hold what errors that are not whitened tie together, (rows,)."""
-        return self._number_stretches(LONG_STRETCH)
+        return self._number_stretches(LONG_STRETCH * self.stretch_s)
 
-    def _number_stretches(self, times: int) -> NDArray[np.intp]:
+    def _number_stretches(self, length_s: float) -> NDArray[np.intp]:
         numbers, start = np.empty(self.rows, dtype=np.intp), 0
         rows = {role: sum(each.stop - each.start for each in self.of_role(role)) for role in ROLES}
         for each in self.segments:
             count = each.stop - each.start
-            length = times * min(self.stretch_s, rows[each.role] / self.rate_hz / self.min_stretches)
+            length = min(length_s, rows[each.role] / self.rate_hz / self.min_stretches)
             blocks = max(int(count / self.rate_hz / length), 1)
             numbers[each.start : each.stop] = start + np.arange(count) * blocks // count
             start += blocks
