@@ -70,7 +70,12 @@ class DataTuning:
         "s",
         least=1e-3,
     )
-    min_stretches: int = tuned(12, "least number of stretches: shorter where time is short", "stretches", least=2)
+    min_stretches: int = tuned(
+        60, "least number of stretches that a variance is taken over: shorter where time is short", "stretches", least=2
+    )
+    min_held_out_stretches: int = tuned(
+        12, "least number of stretches on which predictions are compared", "stretches", least=3
+    )
     held_out_blocks: int = tuned(
         6, "blocks of time that a run is cut into where no run validates", "blocks a run", least=2
     )

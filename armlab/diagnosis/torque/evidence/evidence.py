@@ -100,7 +100,7 @@ class StatesCompared:
         observed, noise = self.model.design.observed, self.model.noise
         left = np.column_stack([self.model.residual_at(joint, each) for each in (less, fit)])
         white = noise.white(left, joint, observed, "validate")
-        blocks = noise.numbers(observed.stretches, joint, observed, "validate")
+        blocks = noise.numbers(observed.held_out_stretches, joint, observed, "validate")
         return held_out_gain(white[:, 0], white[:, 1], blocks)
 
     def validation_rms(self, fit: Fit, joint: int) -> float:

@@ -133,7 +133,8 @@ class Observed:
     it further: in those the noise of the encoders would explain itself.
     rate_hz: of the kept rows. held_out_blocks: whether blocks of time had to stand in for validation runs. moving:
     (rows, joints), False where a joint stands still: friction at rest takes any value, and no law of motion holds.
-    min_segment_rows: shorter stretches in motion are not used. stretch_s, min_stretches: see `stretches`.
+    min_segment_rows: shorter stretches in motion are not used. stretch_s, min_stretches, min_held_out_stretches: of
+    `stretches` and their likes.
     """
 
     signals: tuple[Signals, ...]
@@ -145,6 +146,7 @@ class Observed:
     min_segment_rows: int
     stretch_s: float
     min_stretches: int
+    min_held_out_stretches: int
 
     @property
     def joints(self) -> int:
@@ -189,21 +191,26 @@ class Observed:
     def stretches(self) -> NDArray[np.intp]:
         """Number of the stretch of time of each row, (rows,): the units of chance; none reaches over a segment's end.
 
-        Stretches are shorter in a short recording, so that each role has some of them.
+        Stretches are shorter in a short recording: a variance between them needs many of each role.
         """
-        return self._number_stretches(self.stretch_s)
+        return self._number_stretches(self.stretch_s, self.min_stretches)
+
+    @cached_property
+    def held_out_stretches(self) -> NDArray[np.intp]:
+        """The same for what is predicted on held-out rows, which shares less and less the shorter they are, (rows,)."""
+        return self._number_stretches(self.stretch_s, self.min_held_out_stretches)
 
     @cached_property
     def long_stretches(self) -> NDArray[np.intp]:
         """The same of longer stretches, which hold what errors that are not whitened tie together, (rows,)."""
-        return self._number_stretches(LONG_STRETCH * self.stretch_s)
+        return self._number_stretches(LONG_STRETCH * self.stretch_s, self.min_held_out_stretches)
 
-    def _number_stretches(self, length_s: float) -> NDArray[np.intp]:
+    def _number_stretches(self, length_s: float, least: int) -> NDArray[np.intp]:
         numbers, start = np.empty(self.rows, dtype=np.intp), 0
         rows = {role: sum(each.stop - each.start for each in self.of_role(role)) for role in ROLES}
         for each in self.segments:
             count = each.stop - each.start
-            length = min(length_s, rows[each.role] / self.rate_hz / self.min_stretches)
+            length = min(length_s, rows[each.role] / self.rate_hz / least)
             blocks = max(int(count / self.rate_hz / length), 1)
             numbers[each.start : each.stop] = start + np.arange(count) * blocks // count
             start += blocks
@@ -294,7 +301,7 @@ def _with_segments(
     blocks = not any(each.run.role == "validate" and len(each.torque) >= least for each in signals)
     segments = _split_runs(signals, blocks, tuning)
     moving = moving_rows(signals, segments, cutoff_hz, tuning)
-    stretches = tuning.stretch_s, tuning.min_stretches
+    stretches = tuning.stretch_s, tuning.min_stretches, tuning.min_held_out_stretches
     return Observed(signals, calm, segments, rate_hz, blocks, moving, least, *stretches)
 
 

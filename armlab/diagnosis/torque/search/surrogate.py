@@ -107,7 +107,7 @@ def predict_structure(
     ridge, weights = made.grams.best_ridge(products, tuning.ridge_exponents)
     predicted, *in_turn = (values @ np.column_stack([weights, made.grams.weights_in_turn(products, ridge)])).T
     rows = rows_in(observed.of_role("validate", joint), observed.rows)
-    numbers, learn = observed.stretches, folds >= 0
+    numbers, learn = observed.held_out_stretches, folds >= 0
     validated = held_out_gain(residual[rows], residual[rows] - predicted[rows], numbers[rows])
     turned = residual[learn] - np.choose(folds[learn], [each[learn] for each in in_turn])
     inside = held_out_gain(residual[learn], turned, numbers[learn])
@@ -218,7 +218,7 @@ class _Regression:
         both = (*learn, *judge)
         lost = noise.lost(joint)
         numbers = _stretch_numbers(both, lost, observed.long_stretches)
-        blocks = _stretch_numbers(both, lost, observed.stretches)
+        blocks = _stretch_numbers(both, lost, observed.held_out_stretches)
         known = np.arange(len(blocks)) < sum(each.stop - each.start - lost for each in learn)
         columns, target = _white(left, joint, noise, both)
         thirds = [known & (numbers % 3 == fold) for fold in range(3)]
