@@ -197,7 +197,7 @@ class Observed:
 
     @cached_property
     def held_out_stretches(self) -> NDArray[np.intp]:
-        """The same for what is predicted on held-out rows, which shares less and less the shorter they are, (rows,)."""
+        """The same for predictions of held-out rows, whose errors are tied for longer: longer where time is short."""
         return self._number_stretches(self.stretch_s, self.min_held_out_stretches)
 
     @cached_property
