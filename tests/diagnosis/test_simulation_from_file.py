@@ -2,20 +2,24 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from example_log import record_example
 
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.torque.diagnose import diagnose
-from armlab.diagnosis.torque.rows.simulation import Simulation
+from armlab.diagnosis.torque.rows.simulation import Simulation, read_simulation
 from armlab.effects.friction import CoulombFriction, LevelsAndSlopes, PowerFriction, StribeckFriction, ViscousFriction
 from armlab.effects.term import Term
-from armlab.identification.model_file import model_content
+from armlab.identification.model_file import model_content, write_model
 from armlab.identification.nominal import nominal_model
+from armlab.identification.structure import Structure
+from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.load import load_recording
 from armlab.report.torque.content import parameter_table
 from armlab.report.torque.torque_verdict import verdict_lines
@@ -115,3 +119,15 @@ def test_friction_of_the_file_counts_in_each_law_of_which_it_is_a_special_case(
     shape = {StribeckFriction: (0.05, 2.0), PowerFriction: (2.0,)}.get(law, ())
     candidate = law.at(arm, 1, shape=shape, bounds=((0.0, 9.0),) * len(shape))
     np.testing.assert_allclose(simulation.coefficients_of(candidate), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize(("provenance", "fitted"), [({}, False), ({"settings": {}}, True), ({"runs": ["a"]}, True)])
+def test_a_simulation_was_fitted_where_its_provenance_tells_of_a_fit(
+    provenance: dict[str, object], fitted: bool, tmp_path: Path
+) -> None:
+    recording = load_recording(record_example(tmp_path / "example"))
+    structure = Structure(recording.arm, ())
+    values = structure.base.values(recording.arm.parameters)
+    model = TorqueModel(recording.robot, structure, values, inertial=recording.arm.parameters, provenance=provenance)
+    write_model(model, tmp_path / "model.yaml")
+    assert read_simulation(replace(recording, simulation=tmp_path / "model.yaml"), None).is_fitted is fitted

@@ -54,8 +54,8 @@ def locate_excess(residual: Array, floor: Array, observed: Observed, tuning: Tun
 
 def _significant_excess(power: Array, observed: Observed, tuning: Tuning) -> float:
     """Mean excess power, zero where it may be chance: tested between stretches of time, errors being tied."""
-    numbers = observed.long_stretches
-    means = np.bincount(numbers, power) / np.bincount(numbers)
+    _, numbers, counts = np.unique(observed.long_stretches, return_inverse=True, return_counts=True)
+    means = np.bincount(numbers, power) / counts
     error = float(np.std(means, ddof=1) / np.sqrt(len(means)))
     mean = float(power.mean())
     return mean if mean > tuning.location.min_significance * error * np.sqrt(np.log(len(means) + 1)) else 0.0

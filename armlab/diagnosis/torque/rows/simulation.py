@@ -23,6 +23,7 @@ from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 
 SPEEDS = np.geomspace(1e-3, 5.0, 40)  # rad/s (m/s) at which two laws of friction are compared
+FITTED = frozenset({"runs", "settings"})  # in a provenance: of what a model was fitted to, and how
 MAX_LAW_ERROR = 1e-6  # of the largest torque: more is another law
 
 
@@ -31,7 +32,7 @@ class Simulation:
     """kind: the baseline. inertial: (10 * joints,) of its links, None where there are none; beside a torque that was
     simulated elsewhere they say how large a change of a link may be. model: its friction and other terms, None for a
     robot file that states links and rotors alone, and beside such a torque. is_fitted: whether its provenance
-    names runs that it was identified from, so that it lacks little.
+    tells of a fit to recordings, so that it lacks little.
     """
 
     kind: Baseline
@@ -135,7 +136,7 @@ def read_simulation(recording: Recording, baseline: Baseline | None) -> Simulati
         joints = f"{len(model.arm)} joints, the recording {len(arm)}"
         raise InputError(f"{recording.simulation} has {joints}: it is a model of another arm")
     inertial = model.inertial if model.inertial is not None else model.structure.full(model.base_values)
-    return Simulation(kind, arm, inertial, model, is_fitted=bool(model.provenance.get("runs")))
+    return Simulation(kind, arm, inertial, model, is_fitted=not FITTED.isdisjoint(model.provenance))
 
 
 def _usual_baseline(recording: Recording) -> Baseline:
